@@ -1,0 +1,29 @@
+"""The commands of the command line, one small file each.
+
+For developers: a command is a module with ``NAME``, ``HELP`` (one line), ``EPILOG`` (examples),
+``add_arguments(parser)`` and ``execute(args) -> int``, and one line in `COMMANDS`. At import it loads
+nothing heavy: `--help` must answer at once.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Protocol
+
+from chimera_hpc.commands import plan, reduce, run, status
+
+
+class Command(Protocol):
+    """What a module of this package has."""
+
+    NAME: str
+    HELP: str
+    EPILOG: str
+
+    @staticmethod
+    def add_arguments(parser: ArgumentParser) -> None: ...
+    @staticmethod
+    def execute(args: Namespace) -> int: ...
+
+
+COMMANDS: tuple[Command, ...] = (run, plan, status, reduce)

@@ -1,0 +1,87 @@
+"""What a job may ask to be drawn: points by their values, figures by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.grid.parameters import DELTA, MODELS, SEED, nearest, short
+
+FIGURES = ("space_time", "indicators", "whole_run")
+"""Names of the figures of a sweep, drawn by `chimera_hpc.figures`."""
+CUT_FIGURES = ("dendrogram", "projections", "modal_classes", "classification")
+"""Names of the figures of one cut; the number of clusters may follow, as in dendrogram_3."""
+
+_PARAMETERS = {p.name: p for model in MODELS.values() for p in (*model.parameters, DELTA, SEED)}
+_EXAMPLE = 'NAME=NUMBER is needed, such as "P=9 Q=9 seed=0"'
+_WORD = re.compile(r"\w+=[-+.\w]+", re.ASCII)
+_INTEGER = re.compile(r"[-+]?[0-9]{1,30}")
+_NUMBERED = re.compile(r"([a-z_]+)_([1-9][0-9]{0,8})")
+
+
+def parse_selection(text: str, key: str = "selection") -> dict[str, int | float]:
+    """Return the values by name of a text such as ``P=9 Q=9 seed=0``.
+
+    `key` begins the message of the BadInput for anything else: words that are not NAME=NUMBER,
+    names that no model has, values that the parameter does not take, a name twice.
+    """
+    where = f"{key}: {short(text)}"
+    values: dict[str, int | float] = {}
+    for word in text.split():
+        name, _, number = word.partition("=")
+        if not _WORD.fullmatch(word):
+            raise BadInput(f"{where}: {_EXAMPLE}")
+        if name not in _PARAMETERS:
+            raise BadInput(f"{where}: unknown {short(name)}{nearest(name, list(_PARAMETERS))}")
+        if name in values:
+            raise BadInput(f"{where}: {name} is given twice")
+        try:
+            value = int(number) if _INTEGER.fullmatch(number) else float(number)
+            values[name] = _PARAMETERS[name].check(value)
+        except ValueError as error:
+            raise BadInput(f"{where}: {name}: {error}") from None
+    if not values:
+        raise BadInput(f"{where}: {_EXAMPLE}")
+    return values
+
+
+def split_figure_name(name: str) -> tuple[str, int | None]:
+    """Return a figure's name and its number of clusters: dendrogram_3 is (dendrogram, 3)."""
+    found = _NUMBERED.fullmatch(name)
+    return (found.group(1), int(found.group(2))) if found else (name, None)
+
+
+def check_selections(key: str) -> Callable[[Any], Any]:
+    """Return what turns a list of selections into a tuple of texts, or raises BadInput."""
+
+    def check(value: Any) -> tuple[str, ...]:
+        texts = _texts(value)
+        if texts is None:
+            raise BadInput(f'{key}: {short(value)} is not a list such as ["P=9 Q=9 seed=0"]')
+        for text in texts:
+            parse_selection(text, key)
+        return texts
+
+    return check
+
+
+def check_figures(value: Any) -> Any:
+    """Pass "auto", or return a tuple of known names of figures; BadInput for others."""
+    if value == "auto":
+        return value
+    names, known = _texts(value), [*FIGURES, *CUT_FIGURES]
+    if names is None:
+        text = f'{short(value)} is neither "auto" nor a list of names; known: {", ".join(known)}'
+        raise BadInput(f"reduction.figures: {text}")
+    for name in names:
+        if not (name in known or split_figure_name(name)[0] in CUT_FIGURES):
+            hint = nearest(name, known)
+            raise BadInput(f"reduction.figures: {short(name)} is not a figure{hint}")
+    return names
+
+
+def _texts(value: Any) -> tuple[str, ...] | None:
+    is_list = isinstance(value, list | tuple) and all(isinstance(item, str) for item in value)
+    return tuple(value) if is_list else None

@@ -1,0 +1,74 @@
+"""The project's one way to compile: strict IEEE arithmetic, no GIL, a cache that never goes stale.
+
+numba keys its on-disk cache by the file of the compiled function alone, so a kernel that calls a
+function of another file would be served stale after an edit of that other file. Here the cache
+folder carries a digest of every source file that holds kernels, so an edit anywhere in them
+starts a fresh folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_KERNEL_FOLDERS = ("integrate", "models", "features")
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the kernels' sources and of the versions that compile them (16 hex digits)."""
+    digest = hashlib.blake2b(digest_size=8)
+    digest.update(f"{numba.__version__} {platform.python_version()}".encode())
+    for folder in _KERNEL_FOLDERS:
+        for file in sorted((_PACKAGE / folder).glob("*.py")):
+            digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def cache_folder() -> str:
+    """Folder of the compiled kernels.
+
+    ``$NUMBA_CACHE_DIR`` where it is set (a cluster job sets it to a node-local folder), else
+    the user's cache folder, else, where that can't be written, a temporary folder.
+    """
+    base = os.environ.get("NUMBA_CACHE_DIR")
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    root = Path(base) if base else Path(home) / "chimera_hpc" / "numba"
+    folder = root / source_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return str(folder)
+    except OSError:
+        pass
+    return tempfile.mkdtemp(prefix="chimera_hpc-numba-")
+
+
+def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """``numba.njit`` as every kernel of the project uses it.
+
+    Strict IEEE arithmetic (no fast-math flag of any kind, so a sum keeps its order and a NaN
+    stays a NaN), the GIL released, NumPy's rules for division, compiled code kept on disk.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = cache_folder()
+        try:
+                return numba.njit(*signature, cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(
+                function
+            )
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return decorate

@@ -1,0 +1,236 @@
+"""Keeps the lanes of the stepping loop busy: puts trajectories in, takes finished ones out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.integrate import METHODS
+from chimera_hpc.integrate import kernel as K
+from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.status import Status
+
+Array = NDArray[np.float64]
+
+# Wall time that one call of the compiled loop aims at, seconds: the GIL comes back, time-outs and
+# stop signals are seen.
+SLICE = 0.1
+# Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
+SAMPLE_BYTES = 96_000_000
+# Fewer trajectories than this go one by one: idle lanes of a pack cost as much as busy ones.
+WORTH_A_PACK = 3
+
+
+class System(Protocol):
+    """What the integrator needs to know of a model with its parameters (see `models`)."""
+
+    @property
+    def n_rows(self) -> int: ...
+    @property
+    def right_hand_side(self) -> Any: ...
+    @property
+    def int_params(self) -> NDArray[np.int64]: ...
+    @property
+    def lane_params(self) -> Array: ...
+
+
+@dataclass(frozen=True)
+class Control:
+    """How to integrate and where to sample.
+
+    Samples are taken at ``start + i * step`` as far as ``t_end``.
+    """
+
+    t_end: float
+    start: float
+    step: float
+    rtol: float = 1e-3
+    atol: float = 1e-6
+    method: str = "tsit5"
+    max_steps: int = 10_000_000
+    time_out: float = 600.0
+
+    @property
+    def n_samples(self) -> int:
+        """Number of sampling times."""
+        # A step that fits but for rounding counts: (1000 - 950) / 0.01 is a hair below 5000.
+        return int((self.t_end - self.start) / self.step + 1e-6) + 1
+
+    @property
+    def times(self) -> Array:
+        """Sampling times, shape (n_samples,)."""
+        return np.minimum(self.start + np.arange(self.n_samples) * self.step, self.t_end)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One trajectory's end: status, work done, sampled rows and last state.
+
+    ``samples`` (n_observed, n_samples) is a view of a buffer that is used again: take what is
+    needed before returning; ``n_sampled`` of its columns were reached. ``status`` is DONE or one of the integrator's failures.
+    """
+
+    status: Status
+    steps: int
+    elapsed: float
+    samples: Array
+    n_sampled: int
+    y_end: Array
+
+
+class Stopped(Exception):
+    """The caller asked to stop before every trajectory had ended."""
+
+
+def aligned(*shape: int) -> Array:
+    """Zeros that begin on a cache line, so that no vector load straddles two."""
+    size = int(np.prod(shape))
+    raw = np.zeros(size + 8)
+    offset = (-raw.ctypes.data // 8) % 8
+    return raw[offset : offset + size].reshape(shape)
+
+
+class Lanes:
+    """The state of the stepping loop's lanes (arrays as in `kernel`)."""
+
+    def __init__(self, lanes: int, system: System, control: Control, n_observed: int) -> None:
+        method = METHODS[control.method]
+        rows = system.n_rows
+        self.control, self.method = control, method
+        self.rhs, self.ints = system.right_hand_side, system.int_params
+        self.advance = K.advance(lanes)
+        self.params = aligned(len(system.lane_params), lanes)
+        self.params[:] = system.lane_params[:, None]
+        self.y, self.y1, self.work = (aligned(rows, lanes) for _ in range(3))
+        self.k = aligned(method.stages * rows, lanes)
+        self.lane = aligned(K.LANE_ROWS, lanes)
+        self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
+        self.count[K.STATE] = K.IDLE
+        self.weights = aligned(method.stages, lanes)
+        self.samples = np.zeros((lanes, n_observed, control.n_samples))
+        self.iterations = 64
+
+    def put(self, l: int, y0: Array, params: Array) -> None:  # noqa: E741
+        """Begin a trajectory in lane ``l``."""
+        self.y[:, l] = y0
+        self.params[:, l] = params
+        self.lane[:, l] = 0.0
+        self.lane[K.LOG_ERROR, l] = K.LOG_ERROR_FLOOR
+        self.count[:, l] = 0
+        self.count[K.STATE, l] = K.FRESH
+        if self.control.start <= 0.0:
+            self.samples[l, :, 0] = y0[: self.samples.shape[1]]
+            self.count[K.NEXT_SAMPLE, l] = 1
+
+    def clear(self, l: int) -> None:  # noqa: E741
+        """Empty lane ``l``: zeros everywhere, so that it computes zeros until it is used again."""
+        self.y[:, l] = self.y1[:, l] = self.k[:, l] = 0.0
+        self.lane[:, l] = 0.0
+        self.count[K.STATE, l] = K.IDLE
+
+    def run(self) -> float:
+        """Call the compiled loop once; returns the wall time it took, seconds."""
+        c, m = self.control, self.method
+        began = time.perf_counter()
+        done = self.advance(
+            *(self.rhs, self.params, self.ints, self.y, self.y1, self.k, self.work),
+            *(self.lane, self.count, m.a, m.e, m.p, float(m.order), c.rtol, c.atol, c.t_end),
+            *(c.max_steps, c.start, c.step, self.weights, self.samples, self.iterations),
+        )
+        elapsed = time.perf_counter() - began
+        if done == self.iterations:
+            scale = SLICE / max(elapsed, 1e-6)
+            self.iterations = int(self.iterations * min(max(scale, 0.25), 8.0)) + 1
+        return elapsed
+
+
+def choose_lanes(n_trajectories: int, n_observed: int, n_samples: int) -> int:
+    """One lane or a pack, from the number of trajectories and the memory their samples take."""
+    fits = LANES * n_observed * n_samples * 8 <= SAMPLE_BYTES
+    return LANES if n_trajectories >= WORTH_A_PACK and fits else 1
+
+
+def integrate(
+    systems: Sequence[System],
+    states: Sequence[Array] | Callable[[int], Array],
+    control: Control,
+    n_observed: int,
+    on_end: Callable[[int, Outcome], None],
+    should_stop: Callable[[], bool] | None = None,
+    lanes: int | None = None,
+) -> None:
+    """Integrate trajectories that can share a kernel call, several at a time.
+
+    The bits of a trajectory do not depend on the others, nor on the number of lanes.
+
+    Parameters
+    ----------
+    systems : sequence
+        One per trajectory, equal in right-hand side and integer parameters.
+    states : sequence of shape (n_rows,)
+        Initial states, or a function of the trajectory's number that gives it.
+    control : Control
+    n_observed : int
+        The first ``n_observed`` rows are sampled.
+    on_end : callable
+        Called with (number, `Outcome`) as each trajectory ends, in order of ending.
+    should_stop : callable, optional
+        Asked about ten times a second.
+    lanes : int, optional
+        1 or `LANES`; chosen from the work by default.
+
+    Raises
+    ------
+    Stopped
+        When ``should_stop`` said so.
+    """
+    if not systems:
+        return
+    initial = states if callable(states) else states.__getitem__
+    width = lanes or choose_lanes(len(systems), n_observed, control.n_samples)
+    pool = Lanes(width, systems[0], control, n_observed)
+    waiting = iter(range(len(systems)))
+    holds: list[int | None] = [None] * width
+    spent = np.zeros(width)
+    since = np.zeros(width)
+
+    def fill(l: int) -> None:  # noqa: E741
+        number = next(waiting, None)
+        holds[l] = number
+        if number is None:
+            pool.clear(l)
+            return
+        pool.put(l, initial(number), systems[number].lane_params)
+        spent[l], since[l] = 0.0, time.perf_counter()
+
+    for l in range(width):  # noqa: E741
+        fill(l)
+    while any(number is not None for number in holds):
+        if should_stop is not None and should_stop():
+            raise Stopped
+        busy = [l for l in range(width) if holds[l] is not None]
+        spent[busy] += pool.run() / len(busy)
+        now = time.perf_counter()
+        for l in busy:  # noqa: E741
+            number, state = holds[l], int(pool.count[K.STATE, l])
+            if state == K.RUNNING and now - since[l] > control.time_out:
+                state = int(Status.TIME_OUT)
+            if state == K.RUNNING or number is None:
+                continue
+            on_end(
+                number,
+                Outcome(
+                    Status(state),
+                    int(pool.count[K.ACCEPTED, l]),
+                    float(spent[l]),
+                    pool.samples[l],
+                    int(pool.count[K.NEXT_SAMPLE, l]),
+                    pool.y[:, l].copy(),
+                ),
+            )
+            fill(l)

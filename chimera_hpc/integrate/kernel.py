@@ -1,0 +1,404 @@
+"""The compiled stepping loop: `LANES` trajectories, or one, in lock step.
+
+Each lane has its own time, step size and outcome; all of them go through the stages together.
+Nothing is allocated here and nothing raises: a lane that can't go on gets a status.
+
+Notation of Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I* (HNW),
+secs. II.4 and II.6: ``y`` and ``y1`` are the states before and after the step, ``k`` holds the stages
+one after the other, rows ``j * rows ... (j + 1) * rows - 1`` being stage j. The first stage of a step is
+the last of the one before; instead of a copy, the two change places (``first``).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+from numba.core import types
+
+from chimera_hpc.integrate._jit import jit
+from chimera_hpc.integrate.simd import LANES, larger, load, magnitude, splat, store
+from chimera_hpc.status import Status
+
+# Rows of the lanes' numbers, ``lane`` (LANE_ROWS, lanes).
+TIME, STEP, LOG_ERROR, ERROR_SUM, LOG_ERROR_NEW, TIME_NEW = 0, 1, 2, 3, 4, 5
+LANE_ROWS = 6
+# Rows of the lanes' counters, ``count`` (COUNT_ROWS, lanes).
+STATE, NEXT_SAMPLE, ACCEPTED, TRIED, REJECTED_LAST, IS_DUE = 0, 1, 2, 3, 4, 5
+COUNT_ROWS = 6
+# Values of the row STATE that are no `Status`: nothing to do, put in anew, on its way.
+IDLE, FRESH, RUNNING = -2, -1, 0
+
+# PI control (HNW sec. IV.2): the next step is h * SAFETY * err**(-EXPONENT / order) *
+# err_before**(MEMORY / order), the factor kept within [SMALLEST, LARGEST].
+SAFETY, SMALLEST, LARGEST, EXPONENT, MEMORY = 0.9, 0.2, 10.0, 0.7, 0.4
+LOG_ERROR_FLOOR = math.log(1e-4)
+
+_NON_FINITE = int(Status.NON_FINITE)
+_STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
+_STEP_BUDGET = int(Status.STEP_BUDGET)
+_DONE = int(Status.DONE)
+
+_MATRIX = types.Array(types.float64, 2, "C")
+_VECTOR = types.Array(types.float64, 1, "C")
+RIGHT_HAND_SIDE = types.void(_MATRIX, _MATRIX, _MATRIX, types.Array(types.int64, 1, "C"))
+"""Signature of a right-hand side: ``rhs(y, dy, lane_params, int_params)``."""
+
+
+@jit()
+def _stage_sum(like: Any, y: Any, lane: Any, k: Any, first: Any, a: Any, s: Any, out: Any) -> None:
+    # out = y + h * sum_{j < s} a[s, j] k_j; spelled out up to six terms so that the compiler
+    # keeps the weights in registers, and works on neighbouring rows when there is one lane.
+    rows = y.shape[0]
+    h = load(like, lane, STEP)
+    o0 = first
+    if s == 1:
+        a0 = a[s, 0]
+        for i in range(rows):
+            store(out, i, load(like, y, i) + h * (a0 * load(like, k, o0 + i)))
+        return
+    o1 = rows
+    if s == 2:
+        a0, a1 = a[s, 0], a[s, 1]
+        for i in range(rows):
+            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
+            store(out, i, load(like, y, i) + h * total)
+        return
+    o2 = 2 * rows
+    if s == 3:
+        a0, a1, a2 = a[s, 0], a[s, 1], a[s, 2]
+        for i in range(rows):
+            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
+            total = total + a2 * load(like, k, o2 + i)
+            store(out, i, load(like, y, i) + h * total)
+        return
+    o3 = 3 * rows
+    if s == 4:
+        a0, a1, a2, a3 = a[s, 0], a[s, 1], a[s, 2], a[s, 3]
+        for i in range(rows):
+            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
+            total = total + a2 * load(like, k, o2 + i) + a3 * load(like, k, o3 + i)
+            store(out, i, load(like, y, i) + h * total)
+        return
+    o4 = 4 * rows
+    if s == 5:
+        a0, a1, a2, a3, a4 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4]
+        for i in range(rows):
+            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
+            total = total + a2 * load(like, k, o2 + i) + a3 * load(like, k, o3 + i)
+            total = total + a4 * load(like, k, o4 + i)
+            store(out, i, load(like, y, i) + h * total)
+        return
+    o5 = 5 * rows
+    if s == 6:
+        a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
+        for i in range(rows):
+            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
+            total = total + a2 * load(like, k, o2 + i) + a3 * load(like, k, o3 + i)
+            total = total + a4 * load(like, k, o4 + i) + a5 * load(like, k, o5 + i)
+            store(out, i, load(like, y, i) + h * total)
+        return
+    for i in range(rows):
+        total = a[s, 0] * load(like, k, o0 + i)
+        for j in range(1, s):
+            total = total + a[s, j] * load(like, k, j * rows + i)
+        store(out, i, load(like, y, i) + h * total)
+
+
+@jit()
+def _error_sum(
+    like: Any, y: Any, y1: Any, lane: Any, k: Any, first: Any, e: Any, rtol: Any, atol: Any, work: Any
+) -> None:
+    # sum_i (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2, HNW eq. II.4.11 without the root; the rows
+    # go to four sums in turn, which are then added in a fixed order.
+    rows = y.shape[0]
+    stages = e.size
+    last = rows * (stages - 1) - first
+    h = load(like, lane, STEP)
+    if stages == 7:
+        e0, e1, e2, e3, e4, e5, e6 = e[0], e[1], e[2], e[3], e[4], e[5], e[6]
+        o1, o2, o3, o4, o5 = rows, 2 * rows, 3 * rows, 4 * rows, 5 * rows
+        for i in range(rows):
+            total = e0 * load(like, k, first + i) + e1 * load(like, k, o1 + i)
+            total = total + e2 * load(like, k, o2 + i) + e3 * load(like, k, o3 + i)
+            total = total + e4 * load(like, k, o4 + i) + e5 * load(like, k, o5 + i)
+            total = h * (total + e6 * load(like, k, last + i))
+            size = larger(magnitude(load(like, y, i)), magnitude(load(like, y1, i)))
+            ratio = total / (atol + rtol * size)
+            store(work, i, ratio * ratio)
+    else:
+        for i in range(rows):
+            total = e[0] * load(like, k, first + i) + e[stages - 1] * load(like, k, last + i)
+            for j in range(1, stages - 1):
+                total = total + e[j] * load(like, k, j * rows + i)
+            size = larger(magnitude(load(like, y, i)), magnitude(load(like, y1, i)))
+            ratio = h * total / (atol + rtol * size)
+            store(work, i, ratio * ratio)
+    zero = like
+    s0, s1, s2, s3 = zero, zero, zero, zero
+    quads = rows // 4
+    for q in range(quads):
+        s0 = s0 + load(like, work, 4 * q)
+        s1 = s1 + load(like, work, 4 * q + 1)
+        s2 = s2 + load(like, work, 4 * q + 2)
+        s3 = s3 + load(like, work, 4 * q + 3)
+    for i in range(4 * quads, rows):
+        s0 = s0 + load(like, work, i)
+    store(lane, ERROR_SUM, (s0 + s1) + (s2 + s3))
+
+
+@jit()
+def _scaled_norm(a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, l: Any, rtol: Any, atol: Any) -> Any:  # noqa: E741
+    # Norm of a - weight * b in the error scale of y, in lane l; a, b start at rows a0, b0.
+    rows = y.shape[0]
+    total = 0.0
+    for i in range(rows):
+        ratio = (a[a0 + i, l] - weight * b[b0 + i, l]) / (atol + rtol * abs(y[i, l]))
+        total += ratio * ratio
+    return math.sqrt(total / rows)
+
+
+@jit()
+def _start(
+    rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, first: Any, lane: Any, count: Any,
+    order: Any, rtol: Any, atol: Any, t_end: Any,
+) -> None:
+    # First derivative and first step size of the lanes just put in, HNW sec. II.4 ("Starting
+    # step size"); the rows of the other lanes are not touched.
+    rows, lanes = y.shape
+    s1, s2 = rows, 2 * rows
+    rhs(y, k[s1 : s1 + rows], params, ints)
+    for l in range(lanes):  # noqa: E741
+        if count[STATE, l] == FRESH:
+            for i in range(rows):
+                k[first + i, l] = k[s1 + i, l]
+            d0 = _scaled_norm(y, y, 0.0, y, 0, 0, l, rtol, atol)
+            d1 = _scaled_norm(k, y, 0.0, y, first, 0, l, rtol, atol)
+            h = 1e-6
+            if d0 >= 1e-5 and d1 >= 1e-5:
+                h = 0.01 * d0 / d1
+            lane[STEP, l] = min(h, t_end)
+    for l in range(lanes):  # noqa: E741
+        h = lane[STEP, l] if count[STATE, l] == FRESH else 0.0
+        for i in range(rows):
+            y1[i, l] = y[i, l] + h * k[s1 + i, l]
+    rhs(y1, k[s2 : s2 + rows], params, ints)
+    for l in range(lanes):  # noqa: E741
+        if count[STATE, l] == FRESH:
+            h = lane[STEP, l]
+            d1 = _scaled_norm(k, y, 0.0, y, first, 0, l, rtol, atol)
+            d2 = _scaled_norm(k, k, 1.0, y, s2, s1, l, rtol, atol) / h
+            d = max(d1, d2)
+            h1 = max(1e-6, h * 1e-3)
+            if d > 1e-15:
+                h1 = (0.01 / d) ** (1.0 / (order + 1.0))
+            h = min(100.0 * h, h1, t_end)
+            if not (h > 0.0):
+                h = 1e-6
+            lane[STEP, l] = h
+            count[STATE, l] = RUNNING
+
+
+@jit()
+def _judge(lane: Any, count: Any, rows: Any, t_end: Any) -> Any:
+    # Accept or reject the step of each running lane; returns the number of lanes rejected.
+    rejected = 0
+    for l in range(lane.shape[1]):  # noqa: E741
+        if count[STATE, l] != RUNNING:
+            continue
+        count[TRIED, l] += 1
+        error_sum = lane[ERROR_SUM, l]
+        log_error = LOG_ERROR_FLOOR
+        if not math.isfinite(error_sum):
+            log_error = math.inf
+        elif error_sum > 0.0:
+            log_error = 0.5 * math.log(error_sum / rows)
+        lane[LOG_ERROR_NEW, l] = log_error
+        lane[TIME_NEW, l] = lane[TIME, l]
+        if log_error <= 0.0:
+            t_new = lane[TIME, l] + lane[STEP, l]
+            lane[TIME_NEW, l] = min(t_new, t_end)
+        else:
+            rejected += 1
+    return rejected
+
+
+@jit()
+def _sample(
+    like: Any, y: Any, k: Any, first: Any, work: Any, lane: Any, count: Any, p: Any, start: Any, step: Any,
+    t_end: Any, weights: Any, samples: Any,
+) -> None:
+    # Values of the observed rows at the sampling times that the accepted steps cover, by the
+    # continuous extension; the lanes take their first, second, ... sample of the step together.
+    rows, lanes = y.shape
+    stages, degree = p.shape
+    total = samples.shape[2]
+    last = rows * (stages - 1) - first
+    h = load(like, lane, STEP)
+    while True:
+        due = 0
+        for l in range(lanes):  # noqa: E741
+            at = count[NEXT_SAMPLE, l]
+            t = min(start + at * step, t_end)
+            is_due = (
+                count[STATE, l] == RUNNING
+                and at < total
+                and lane[LOG_ERROR_NEW, l] <= 0.0
+                and t <= lane[TIME_NEW, l]
+            )
+            count[IS_DUE, l] = is_due
+            due += is_due
+            theta = min((t - lane[TIME, l]) / lane[STEP, l], 1.0) if is_due else 0.0
+            for j in range(stages):
+                weight = 0.0
+                for d in range(degree - 1, -1, -1):
+                    weight = (weight + p[j, d]) * theta
+                weights[j, l] = weight
+        if due == 0:
+            return
+        for i in range(samples.shape[1]):
+            value = load(like, weights, 0) * load(like, k, first + i)
+            for j in range(1, stages - 1):
+                value = value + load(like, weights, j) * load(like, k, j * rows + i)
+            value = value + load(like, weights, stages - 1) * load(like, k, last + i)
+            store(work, i, load(like, y, i) + h * value)
+        for l in range(lanes):  # noqa: E741
+            if count[IS_DUE, l] == 1:
+                at = count[NEXT_SAMPLE, l]
+                for i in range(samples.shape[1]):
+                    samples[l, i, at] = work[i, l]
+                count[NEXT_SAMPLE, l] = at + 1
+
+
+@jit()
+def _next_step(lane: Any, count: Any, l: Any, order: Any, t_end: Any, max_steps: Any) -> None:  # noqa: E741
+    # Move lane l on and choose its next step size, or end it.
+    log_error = lane[LOG_ERROR_NEW, l]
+    if log_error <= 0.0:
+        bounded = max(log_error, LOG_ERROR_FLOOR)
+        factor = SAFETY * math.exp((MEMORY * lane[LOG_ERROR, l] - EXPONENT * bounded) / order)
+        factor = min(LARGEST, max(SMALLEST, factor))
+        if count[REJECTED_LAST, l] == 1:
+            factor = min(1.0, factor)
+        lane[LOG_ERROR, l] = bounded
+        count[REJECTED_LAST, l] = 0
+        count[ACCEPTED, l] += 1
+        lane[TIME, l] = lane[TIME_NEW, l]
+        if lane[TIME, l] >= t_end:
+            count[STATE, l] = _DONE
+    else:
+        factor = max(SMALLEST, SAFETY * math.exp(-log_error / order))
+        count[REJECTED_LAST, l] = 1
+    t = lane[TIME, l]
+    h = lane[STEP, l] * factor
+    if count[STATE, l] == RUNNING:
+        if h <= 1e-14 * max(abs(t), 1e-3):
+            count[STATE, l] = _STEP_TOO_SMALL if math.isfinite(log_error) else _NON_FINITE
+        elif count[TRIED, l] >= max_steps:
+            count[STATE, l] = _STEP_BUDGET
+    # A step that would end just short of t_end is stretched to it: no sliver is left over.
+    if t + 1.01 * h >= t_end:
+        h = t_end - t
+    lane[STEP, l] = h if count[STATE, l] == RUNNING else 0.0
+
+
+@jit()
+def _advance(
+    like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, work: Any, lane: Any, count: Any,
+    a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any, max_steps: Any, start: Any,
+    step: Any, weights: Any, samples: Any, iterations: Any,
+) -> Any:
+    rows, lanes = y.shape
+    stages = e.size
+    first = 0
+    n_fresh = 0
+    n_running = 0
+    for l in range(lanes):  # noqa: E741
+        n_fresh += count[STATE, l] == FRESH
+        n_running += count[STATE, l] == RUNNING
+    if n_fresh > 0:
+        _start(rhs, params, ints, y, y1, k, first, lane, count, order, rtol, atol, t_end)
+        n_running += n_fresh
+    done = 0
+    swapped = False
+    still = n_running
+    while done < iterations and still == n_running:
+        last = rows * (stages - 1) - first
+        for s in range(1, stages):
+            _stage_sum(like, y, lane, k, first, a, s, y1)
+            o = last if s == stages - 1 else s * rows
+            rhs(y1, k[o : o + rows], params, ints)
+        _error_sum(like, y, y1, lane, k, first, e, rtol, atol, work)
+        rejected = _judge(lane, count, rows, t_end)
+        _sample(like, y, k, first, work, lane, count, p, start, step, t_end, weights, samples)
+        if rejected > 0:
+            for l in range(lanes):  # noqa: E741
+                if count[STATE, l] == RUNNING and lane[LOG_ERROR_NEW, l] > 0.0:
+                    for i in range(rows):
+                        y1[i, l] = y[i, l]
+                        k[last + i, l] = k[first + i, l]
+        still = 0
+        for l in range(lanes):  # noqa: E741
+            if count[STATE, l] == RUNNING:
+                _next_step(lane, count, l, order, t_end, max_steps)
+                still += count[STATE, l] == RUNNING
+        y, y1 = y1, y
+        swapped = not swapped
+        first = last
+        done += 1
+    # Hand the state back where it came from.
+    if swapped:
+        for i in range(rows):
+            for l in range(lanes):  # noqa: E741
+                y1[i, l] = y[i, l]
+    if first != 0:
+        for i in range(rows):
+            for l in range(lanes):  # noqa: E741
+                k[i, l] = k[first + i, l]
+    return done
+
+
+_SIGNATURE = types.int64(
+    types.FunctionType(RIGHT_HAND_SIDE),
+    *(_MATRIX, types.Array(types.int64, 1, "C")),
+    *(_MATRIX, _MATRIX, _MATRIX, _MATRIX),
+    *(_MATRIX, types.Array(types.int64, 2, "C")),
+    *(_MATRIX, _VECTOR, _MATRIX),
+    *(types.float64, types.float64, types.float64, types.float64, types.int64),
+    *(types.float64, types.float64, _MATRIX, types.Array(types.float64, 3, "C"), types.int64),
+)
+
+
+def _advance_one(
+    rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end, max_steps,
+    start, step, weights, samples, iterations,
+):  # type: ignore[no-untyped-def]
+    return _advance(
+        0.0, rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end,
+        max_steps, start, step, weights, samples, iterations,
+    )
+
+
+def _advance_pack(
+    rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end, max_steps,
+    start, step, weights, samples, iterations,
+):  # type: ignore[no-untyped-def]
+    return _advance(
+        splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end,
+        max_steps, start, step, weights, samples, iterations,
+    )
+
+
+@cache
+def advance(lanes: int) -> Any:
+    """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
+
+    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, a, e, p, order, rtol,
+    atol, t_end, max_steps, start, step, weights, samples, iterations)`` tries at most ``iterations``
+    steps in every running lane and comes back as soon as a lane has ended; it returns how many
+    it tried. Lanes marked `FRESH` are started first: first derivative, first step size.
+    """
+    if lanes not in (1, LANES):
+        raise ValueError(f"the stepping loop is compiled for 1 and {LANES} lanes, not {lanes}")
+    return jit(_SIGNATURE)(_advance_one if lanes == 1 else _advance_pack)

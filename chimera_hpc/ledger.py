@@ -1,0 +1,222 @@
+"""The ledger: what became of every point, read straight from its chunk files, without Zarr.
+
+A chunk of the ledger is the plain little-endian bytes of (points of the block) x `FIELDS` int64,
+followed by their crc32c (Zarr v3 codecs `bytes` and `crc32c`); `features` and `scalars` are stored
+in the same way. A missing chunk means that no point of the block ever ran, and so does one that
+cannot be trusted: wrong length or wrong checksum.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
+
+import google_crc32c
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.status import Status
+
+FIELDS = ("status", "attempts", "steps", "elapsed_us", "n_windows", "run", "digest")
+FAILED = tuple(status for status in Status if status.is_failure)
+RESULTS = tuple(status for status in Status if status.is_result)
+SEPARATOR = "."
+"""Between the parts of a chunk's name: the chunks of an array lie flat in its folder."""
+METADATA = "zarr.json"
+"""Root metadata, with the attributes and the metadata of all arrays."""
+METADATA_COPY = "zarr.json.copy"
+"""The same with its crc32c behind it."""
+_CHECKSUM_BYTES = 4
+
+
+@dataclass(frozen=True)
+class LedgerScan:
+    """Everything that the ledger says."""
+
+    columns: dict[str, NDArray[np.int64]]
+    """One entry a point for each of `FIELDS`; status 255 and zeros where a point never ran."""
+    written: NDArray[np.bool_]
+    """Whether each block has a sound ledger chunk."""
+    damaged: tuple[int, ...]
+    """Blocks whose ledger chunk is there, but of wrong length or checksum."""
+
+
+def seal(data: bytes) -> bytes:
+    """Return the data followed by its crc32c, as Zarr's codec `crc32c` stores it."""
+    checksum: int = google_crc32c.value(data)
+    return data + checksum.to_bytes(_CHECKSUM_BYTES, "little")
+
+
+def unseal(sealed: bytes, size: int) -> bytes | None:
+    """Return the `size` bytes before the crc32c, or None when length or checksum is wrong."""
+    if len(sealed) != size + _CHECKSUM_BYTES:
+        return None
+    data = sealed[:size]
+    checksum = int.from_bytes(sealed[size:], "little")
+    return data if google_crc32c.value(data) == checksum else None
+
+
+def sealed_size(size: int) -> int:
+    """Return the length of a sealed file of `size` bytes of data."""
+    return size + _CHECKSUM_BYTES
+
+
+def chunk_name(block: int, n_dimensions: int) -> str:
+    """Return the name of a block's chunk file inside the folder of its array."""
+    return SEPARATOR.join(["c", str(block), *["0"] * (n_dimensions - 1)])
+
+
+def read_metadata(store: Path) -> dict[str, Any]:
+    """Return the root metadata of a store, consolidated metadata of its arrays included.
+
+    Where the file is damaged, its copy is read instead. Raises BadInput when the path is not a
+    store of ours.
+    """
+    store = Path(store)
+    if not store.is_dir():
+        raise BadInput(f"{store}: not a sweep's store: no such folder")
+    try:
+        root = _parse(_bytes(store / METADATA)) or read_copy(store)
+    except OSError as error:
+        raise BadInput(f"{store}: not a sweep's store: {METADATA}: {error.strerror}") from None
+    if root is None:
+        raise BadInput(f"{store}: not a sweep's store: {METADATA} is missing, damaged, or not ours")
+    return root
+
+
+def read_copy(store: Path) -> dict[str, Any] | None:
+    """Return the root metadata from their checksummed copy; None where that is no use."""
+    sealed = _bytes(store / METADATA_COPY)
+    return _parse(unseal(sealed, len(sealed) - _CHECKSUM_BYTES) or b"")
+
+
+def ledger_shape(metadata: Mapping[str, Any]) -> tuple[int, int]:
+    """Return the numbers of points of a store and of points in a block, from its root metadata."""
+    ledger = metadata["consolidated_metadata"]["metadata"]["ledger"]
+    return int(ledger["shape"][0]), int(ledger["chunk_grid"]["configuration"]["chunk_shape"][0])
+
+
+def read_ledger(store: Path) -> dict[str, NDArray[np.int64]]:
+    """Return the ledger's columns over all points of a store; see `LedgerScan.columns`."""
+    return scan_ledger(store).columns
+
+
+def scan_ledger(store: Path, metadata: Mapping[str, Any] | None = None) -> LedgerScan:
+    """Read every ledger chunk and check its length and crc32c; a damaged one is no error."""
+    n_points, block_size = ledger_shape(metadata or read_metadata(store))
+    n_blocks = -(-n_points // block_size)
+    table = np.full((n_blocks, block_size, len(FIELDS)), Status.NEVER, dtype="<i8")
+    written = np.zeros(n_blocks, dtype=np.bool_)
+    damaged = []
+    for block, path in _chunks(Path(store) / "ledger", n_blocks):
+        rows = _read_chunk(path, block_size)
+        if rows is None:
+            damaged.append(block)
+        else:
+            table[block] = rows
+            written[block] = True
+    columns = table_columns(table.reshape(-1, len(FIELDS))[:n_points])
+    return LedgerScan(columns, written, tuple(sorted(damaged)))
+
+
+def read_block(store: Path, block: int, block_size: int) -> NDArray[np.int64] | None:
+    """Return a ledger chunk, shape (block_size, fields); None when it is missing or damaged."""
+    return _read_chunk(os.path.join(store, "ledger", chunk_name(block, 2)), block_size)
+
+
+def table_columns(table: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+    """Return the rows of a ledger chunk as columns; see `LedgerScan.columns`."""
+    never = table[:, 0] == Status.NEVER
+    columns = {name: table[:, k].copy() for k, name in enumerate(FIELDS)}
+    for name in FIELDS[1:]:
+        columns[name][never] = 0
+    return columns
+
+
+def unfinished(
+    columns: Mapping[str, NDArray[np.int64]],
+    attempts: int = 0,
+    statuses: Collection[Status] = FAILED,
+) -> NDArray[np.bool_]:
+    """Tell which points are to be run: never run, or failed fewer than `attempts` times.
+
+    `statuses` limits which failures are tried again.
+    """
+    status = columns["status"]
+    again = np.isin(status, [int(code) for code in statuses]) & (columns["attempts"] < attempts)
+    return np.asarray((status == Status.NEVER) | again)
+
+
+def canonical(values: ArrayLike) -> NDArray[np.float64]:
+    """Return a little-endian, contiguous copy with every NaN the same NaN, as it is stored."""
+    copy = np.array(values, dtype="<f8", order="C")
+    copy[np.isnan(copy)] = np.nan
+    return copy
+
+
+def digests(features: ArrayLike, scalars: ArrayLike) -> NDArray[np.int64]:
+    """Return the signed 64-bit BLAKE2b digest of each point's results.
+
+    Parameters
+    ----------
+    features : (points, features, nodes)
+    scalars : (points, quantities)
+
+    The digest runs over the stored bytes (`canonical`) of the point's features, then of its
+    scalars; times and attempts do not enter.
+    """
+    rows = zip(canonical(features), canonical(scalars), strict=True)
+    return np.array([_digest(row.tobytes() + more.tobytes()) for row, more in rows], dtype=np.int64)
+
+
+def point_digest(features: ArrayLike, scalars: ArrayLike) -> int:
+    """Return the digest of one point: features (features, nodes), scalars (quantities,)."""
+    return int(digests(np.asarray(features)[np.newaxis], np.asarray(scalars)[np.newaxis])[0])
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b""
+
+
+def _parse(data: bytes) -> dict[str, Any] | None:
+    """Return root metadata if it is whole: its parts are there and do not contradict each other."""
+    try:
+        root = json.loads(data)
+        attributes = root["attributes"]
+        shape = (attributes["n_points"], attributes["block_size"])
+        whole = ledger_shape(root) == shape and min(shape) > 0 and attributes["digest"]
+        whole = whole and isinstance(attributes["spec"], dict)
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError):
+        return None
+    return dict(root) if whole else None
+
+
+def _digest(data: bytes) -> int:
+    return int.from_bytes(blake2b(data, digest_size=8).digest(), "little", signed=True)
+
+
+def _chunks(folder: Path, n_blocks: int) -> list[tuple[int, str]]:
+    """Return (block, path) of the chunk files that are there."""
+    names = os.listdir(folder) if folder.is_dir() else []
+    parts = [(name, name.split(SEPARATOR)) for name in names]
+    numbers = [(p[1], n) for n, p in parts if len(p) == 3 and p[0] == "c" and p[1].isdecimal()]
+    return [(int(i), os.path.join(folder, n)) for i, n in numbers if int(i) < n_blocks]
+
+
+def _read_chunk(path: str, block_size: int) -> NDArray[np.int64] | None:
+    try:
+        with open(path, "rb", buffering=0) as file:
+            sealed = file.read()
+    except OSError:
+        return None
+    data = unseal(sealed or b"", block_size * len(FIELDS) * 8)
+    return None if data is None else np.frombuffer(data, "<i8").reshape(block_size, len(FIELDS))

@@ -1,0 +1,146 @@
+"""The classical networked FitzHugh-Nagumo model on a ring (paper eq. eq:FHNnet)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.integrate._jit import jit
+from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
+from chimera_hpc.integrate.simd import LANES, load, splat, store
+
+Array = NDArray[np.float64]
+
+THIRD = 1.0 / 3.0
+
+
+@jit()
+def _networked(like: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
+    # Both sums over the 2P neighbours slide along the ring together.
+    n, half = ints[0], ints[1]
+    rate, b, gain = load(like, params, 0), load(like, params, 1), load(like, params, 2)
+    same, cross = load(like, params, 3), load(like, params, 4)
+    width = 2.0 * half + 1.0
+    sum_x, sum_y = load(like, y, n - 1), load(like, y, 2 * n - 1)
+    for k in range(1, half + 1):
+        sum_x = sum_x + (load(like, y, k - 1) + load(like, y, n - 1 - k))
+        sum_y = sum_y + (load(like, y, n + k - 1) + load(like, y, 2 * n - 1 - k))
+    ahead, behind = half, n - half - 1
+    for i in range(n):
+        sum_x = sum_x + (load(like, y, ahead) - load(like, y, behind))
+        sum_y = sum_y + (load(like, y, n + ahead) - load(like, y, n + behind))
+        ahead = ahead + 1 if ahead + 1 < n else 0
+        behind = behind + 1 if behind + 1 < n else 0
+        x, z = load(like, y, i), load(like, y, n + i)
+        pull_x, pull_y = sum_x - width * x, sum_y - width * z
+        store(dy, i, (x - x * x * x * THIRD - z + gain * (same * pull_x + cross * pull_y)) * rate)
+        store(dy, n + i, x + b + gain * (same * pull_y - cross * pull_x))
+
+
+def networked_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
+    """Right-hand side; ``lane_params`` rows: 1/epsilon, b, sigma/2P, cos phi, sin phi."""
+    if y.shape[1] == LANES:
+        _networked(splat(0.0), y, dy, lane_params, int_params)
+    else:
+        _networked(0.0, y, dy, lane_params, int_params)
+
+
+@cache
+def _compiled() -> Any:
+    return jit(RIGHT_HAND_SIDE)(networked_rhs)
+
+
+@dataclass(frozen=True)
+class NetworkedFHN:
+    r"""A ring of FitzHugh-Nagumo oscillators coupled through both variables (eq. eq:FHNnet).
+
+    .. math::
+        \epsilon \dot x_i &= x_i - x_i^3/3 - y_i + \frac{\sigma}{2P} \sum_{j=i-P}^{i+P}
+            [b_{xx} (x_j - x_i) + b_{xy} (y_j - y_i)] \\
+        \dot y_i &= x_i + b + \frac{\sigma}{2P} \sum_{j=i-P}^{i+P}
+            [b_{yx} (x_j - x_i) + b_{yy} (y_j - y_i)]
+
+    with :math:`b_{xx} = b_{yy} = \cos\phi` and :math:`b_{xy} = -b_{yx} = \sin\phi`. The cost of a
+    step does not depend on P. Parameters default to those of the paper's appendix sec:compS.
+
+    Raises
+    ------
+    BadInput
+        Unless 1 <= P, 2 P < n_nodes and epsilon > 0.
+    """
+
+    n_nodes: int = 500
+    half_degree: int = 165
+    sigma: float = 0.1
+    epsilon: float = 0.05
+    b: float = 0.5
+    phi: float = math.pi / 2 - 0.1
+
+    name = "networked_fhn"
+
+    def __post_init__(self) -> None:
+        """Check the ring and the time scale."""
+        if self.half_degree < 1 or 2 * self.half_degree >= self.n_nodes:
+            raise BadInput(
+                f"P = {self.half_degree} on a ring of {self.n_nodes} nodes: "
+                "1 <= P and 2 P < n_nodes are needed"
+            )
+        if not self.epsilon > 0.0:
+            raise BadInput(f"epsilon = {self.epsilon}: must be above 0")
+
+    @property
+    def n_rows(self) -> int:
+        """Number of integrated variables, 2 N0."""
+        return 2 * self.n_nodes
+
+    @property
+    def n_second(self) -> int:
+        """Number of second variables y in an initial state."""
+        return self.n_nodes
+
+    @property
+    def lane_group(self) -> tuple[Any, ...]:
+        """What trajectories must share to run as lanes of one kernel call."""
+        return (self.name, self.n_nodes, self.half_degree)
+
+    @property
+    def right_hand_side(self) -> Any:
+        """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
+        return _compiled()
+
+    @property
+    def int_params(self) -> NDArray[np.int64]:
+        """Integers that all lanes share: N0, P."""
+        return np.array([self.n_nodes, self.half_degree], dtype=np.int64)
+
+    @property
+    def lane_params(self) -> Array:
+        """This trajectory's column of parameters, shape (5,)."""
+        gain = self.sigma / (2 * self.half_degree)
+        return np.array(
+            [1.0 / self.epsilon, self.b, gain, math.cos(self.phi), math.sin(self.phi)]
+        )
+
+    def state(self, u: Array, v: Array) -> Array:
+        """Integrated variables of a state given by x and y, both (N0,)."""
+        return np.concatenate([u, v])
+
+    def node_pair(self, rows: Array) -> tuple[Array, Array]:
+        """The two signals x and y from rows (n_rows, ...)."""
+        return rows[: self.n_nodes], rows[self.n_nodes :]
+
+    def second_variable(self, rows: Array, v0: Array, t: Array) -> Array:
+        """The variables y, shape (T, N0), from rows (n_rows, T)."""
+        return rows[self.n_nodes :].T
+
+    def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]:
+        """State (x, y) that initial conditions are drawn around; only the origin is known."""
+        if which != "origin":
+            raise BadInput(f'integrator.centre = "{which}": networked_fhn knows "origin" only')
+        return 0.0, 0.0

@@ -1,0 +1,1 @@
+"""One function a figure: takes arrays, returns a matplotlib Figure, writes nothing."""

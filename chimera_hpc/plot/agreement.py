@@ -1,0 +1,84 @@
+"""Several methods on the same runs: confusion matrices, and classes cell by cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from chimera_hpc.plot import style
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Counts (k, k) of runs that one method calls row and the other column."""
+
+    rows: str
+    columns: str
+    classes: Sequence[str]
+    counts: ArrayLike
+
+
+@style.styled
+def confusion_matrices(comparisons: Sequence[Comparison]) -> Figure:
+    """Draw one matrix for each pair of methods; the title gives the share of equal verdicts."""
+    figure = style.new_figure(2.5 * len(comparisons) + 0.5, 2.7)
+    axes = list(figure.subplots(1, len(comparisons), squeeze=False)[0])
+    for frame, comparison in zip(axes, comparisons, strict=True):
+        _draw_matrix(frame, comparison)
+    style.letter(axes)
+    return figure
+
+
+def _draw_matrix(axes: Axes, comparison: Comparison) -> None:
+    counts = np.asarray(comparison.counts, dtype=np.int64)
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
+    for (row, column), count in np.ndenumerate(counts):
+        shade = "white" if share[row, column] > 0.5 else "black"
+        axes.text(column, row, str(count), ha="center", va="center", color=shade)
+    names = [style.spoken(name) for name in comparison.classes]
+    axes.set_xticks(range(len(names)), names, rotation=20.0, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xlabel(comparison.columns)
+    axes.set_ylabel(comparison.rows)
+    total = int(counts.sum())
+    equal = f"{np.trace(counts) / total:.1%}" if total else "no runs"
+    axes.set_title(f"agree: {equal}")
+
+
+@style.styled
+def verdicts(
+    x: ArrayLike, methods: Mapping[str, Sequence[str | None]], *, label: str = "$P$"
+) -> Figure:
+    """Draw each method's class for each cell x (k,) in a row; a bar marks where they differ."""
+    values = np.asarray(x, dtype=np.float64)
+    figure = style.new_figure(style.PAGE - 0.8, 1.1 + 0.36 * len(methods))
+    axes = figure.subplots()
+    differ = [len(set(column)) > 1 for column in zip(*methods.values(), strict=True)]
+    width = float(np.min(np.diff(np.unique(values)), initial=1.0))
+    for position in values[differ]:
+        axes.axvspan(position - 0.5 * width, position + 0.5 * width, color="#fbe7b2", linewidth=0.0)
+    for row, classes in enumerate(methods.values()):
+        for name in style.in_order(name for name in classes if name is not None):
+            chosen = values[[other == name for other in classes]]
+            axes.scatter(
+                chosen,
+                np.full(len(chosen), row),
+                s=30.0,
+                marker=style.marker_of(name),
+                color=style.colour_of(name),
+                linewidths=0.0,
+            )
+    axes.set_yticks(range(len(methods)), list(methods))
+    axes.set_ylim(len(methods) - 0.4, -0.6)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
+    axes.set_xlabel(label)
+    names = [name for classes in methods.values() for name in classes if name is not None]
+    style.add_class_legend(figure, names)
+    return figure

@@ -1,0 +1,88 @@
+"""Runs at other parameters over the classes of a finished sweep.
+
+Paper fig:hvsnmin:orient:1b (parameter b) and fig:hvsnmin:orient:1a (epsilon).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from chimera_hpc.plot import style
+from chimera_hpc.plot.projections import LABELS
+
+
+@dataclass(frozen=True)
+class Diamonds:
+    """One panel: mean triplets (k, 3), one for each value (k,) of the parameter."""
+
+    title: str
+    triplets: ArrayLike
+    values: ArrayLike
+
+
+@style.styled
+def atlas(
+    triplets: ArrayLike,
+    labels: ArrayLike,
+    names: Sequence[str],
+    panels: Sequence[Diamonds],
+    *,
+    parameter: str = r"$\epsilon$",
+    plane: tuple[int, int] = (0, 1),
+) -> Figure:
+    """Draw the classes of triplets (n, 3) in light colours, and diamonds coloured by a parameter.
+
+    The larger the value, the darker the diamond; all panels share one colour scale.
+    """
+    figure = style.new_figure(style.PAGE + 0.6, 2.75)
+    axes = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
+    every = np.concatenate([np.ravel(np.asarray(panel.values, float)) for panel in panels])
+    # From a light yellow that still shows on white to nearly black.
+    colours = LinearSegmentedColormap.from_list(
+        "light_to_dark", colormaps["inferno_r"](np.linspace(0.08, 0.95, 256))
+    )
+    x, y = plane
+    points, label = np.asarray(triplets, float), np.asarray(labels)
+    for frame, panel in zip(axes, panels, strict=True):
+        for i, name in enumerate(names):
+            chosen = points[label == i]
+            frame.scatter(
+                chosen[:, x],
+                chosen[:, y],
+                s=12.0,
+                marker=style.marker_of(name),
+                color=style.lighten(style.colour_of(name), 0.72),
+                linewidths=0.0,
+                label=style.spoken(name),
+            )
+        above = np.asarray(panel.triplets, float).reshape(-1, 3)
+        marks = frame.scatter(
+            above[:, x],
+            above[:, y],
+            c=np.asarray(panel.values, float),
+            vmin=every.min(),
+            vmax=every.max(),
+            s=30.0,
+            marker="D",
+            cmap=colours,
+            edgecolors="#444444",
+            linewidths=0.4,
+            zorder=3.0,
+        )
+        frame.set_title(panel.title)
+        frame.set_xlabel(LABELS[x])
+    axes[0].set_ylabel(LABELS[y])
+    style.letter(list(axes))
+    figure.colorbar(marks, ax=list(axes), label=parameter, fraction=0.03, pad=0.01)
+    handles = style.class_handles(names)
+    for handle in handles:
+        handle.set_color(style.lighten(str(handle.get_color()), 0.72))
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    return figure

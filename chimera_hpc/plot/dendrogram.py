@@ -1,0 +1,92 @@
+"""The tree of merges with the line that cuts it (paper fig:hvsnmin:orient:1, panel a)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.cluster import hierarchy
+
+from chimera_hpc.plot import style
+
+_STEM = "#777777"
+
+
+@style.styled
+def dendrogram(
+    linkage: NDArray[np.float64],
+    leaf_labels: NDArray[np.int64],
+    names: Sequence[str],
+    depth: float,
+) -> Figure:
+    """Draw the tree of m leaves with its classes coloured; arguments as in `draw_dendrogram`."""
+    figure = style.new_figure(style.COLUMN + 0.6, 2.9)
+    draw_dendrogram(figure.subplots(), linkage, leaf_labels, names, depth)
+    style.add_class_legend(figure, names)
+    return figure
+
+
+def draw_dendrogram(
+    axes: Axes,
+    linkage: NDArray[np.float64],
+    leaf_labels: NDArray[np.int64],
+    names: Sequence[str],
+    depth: float,
+) -> None:
+    """Draw every merge as a bracket, in its class's colour below the cut, and the cut as a line.
+
+    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line.
+    """
+    segments, owner = brackets(linkage, leaf_labels)
+    for label in range(-1, len(names)):
+        chosen = segments[owner == label]
+        colour = style.colour_of(names[label]) if label >= 0 else _STEM
+        lines = LineCollection(list(chosen), colors=colour, linewidths=0.7, capstyle="butt")
+        lines.set_rasterized(len(chosen) > 2000)
+        lines.set_label(names[label] if label >= 0 else "above the cut")
+        axes.add_collection(lines)
+    axes.axhline(depth, color="black", linewidth=0.9, linestyle="--", label="cut")
+    top = max(float(linkage[:, 2].max(initial=0.0)), depth, 1e-12)
+    n_places = max(len(leaf_labels), 1)
+    axes.set_xlim(-0.01 * n_places - 0.5, 1.01 * n_places - 0.5)
+    axes.set_ylim(0.0, 1.05 * top)
+    axes.set_xticks([])
+    axes.set_xlabel(f"{len(leaf_labels)} runs", labelpad=6.0)
+    axes.set_ylabel("depth $d$ (scaled units)")
+    axes.annotate(
+        f"$d$ = {depth:.3g}",
+        (0.98, depth),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha="right",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
+    )
+
+
+def brackets(
+    linkage: NDArray[np.float64], leaf_labels: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the bracket of each merge as four corners (m - 1, 4, 2), and its class or -1.
+
+    The class of a merge is that of all its leaves; -1 where they differ.
+    """
+    n_leaves = len(leaf_labels)
+    if n_leaves < 2:
+        return np.empty((0, 4, 2)), np.empty(0, dtype=np.int64)
+    place = np.empty(2 * n_leaves - 1)
+    place[hierarchy.leaves_list(linkage)] = np.arange(n_leaves)
+    height = np.concatenate([np.zeros(n_leaves), linkage[:, 2]])
+    label = np.concatenate([leaf_labels, np.empty(n_leaves - 1, dtype=np.int64)])
+    corners = np.empty((n_leaves - 1, 4, 2))
+    for row, (left, right) in enumerate(linkage[:, :2].astype(np.int64)):
+        node = n_leaves + row
+        place[node] = 0.5 * (place[left] + place[right])
+        label[node] = label[left] if label[left] == label[right] else -1
+        corners[row, :, 0] = place[[left, left, right, right]]
+        corners[row, :, 1] = height[[left, node, node, right]]
+    return corners, label[n_leaves:]

@@ -1,0 +1,79 @@
+"""Fourier indicators against the node: phase, amplitude, frequency (paper fig:9fourier)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from chimera_hpc.plot import style
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """Indicators of one run; every array is (N,)."""
+
+    phase: ArrayLike
+    amplitude: ArrayLike
+    frequency: ArrayLike
+    phase_std: ArrayLike
+    amplitude_std: ArrayLike
+    frequency_std: ArrayLike
+
+
+_ROWS = (
+    ("phase", r"$\langle\theta_i\rangle$ (rad)"),
+    ("amplitude", r"$\langle a_i\rangle$"),
+    ("frequency", r"$\langle\Omega_i\rangle$ (1/time)"),
+)
+
+
+@style.styled
+def fourier_indicators(runs: Sequence[Profiles], titles: Sequence[str] = ()) -> Figure:
+    """Draw a column for each run: means as dots, one standard deviation to each side as a band."""
+    figure = style.new_figure(max(style.COLUMN, 2.35 * len(runs)), 4.6)
+    axes = figure.subplots(3, len(runs), squeeze=False, sharex="col")
+    for j, run in enumerate(runs):
+        for i, (name, label) in enumerate(_ROWS):
+            period = 2.0 * np.pi if name == "phase" else 0.0
+            _draw_profile(axes[i, j], getattr(run, name), getattr(run, f"{name}_std"), period)
+            if j == 0:
+                axes[i, j].set_ylabel(label)
+        axes[0, j].set_ylim(-np.pi - 0.3, np.pi + 0.3)
+        axes[0, j].set_yticks([-np.pi, 0.0, np.pi], [r"$-\pi$", "0", r"$\pi$"])
+        axes[0, j].set_title(titles[j] if j < len(titles) else "")
+        axes[2, j].set_xlabel("node $i$")
+    style.letter(list(axes[0]))
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _draw_profile(axes: Axes, mean: ArrayLike, deviation: ArrayLike, period: float) -> None:
+    """Draw dots and, where the deviation is known (two windows or more), the band.
+
+    A quantity with a period (0: none) has its band repeated one period above and below.
+    """
+    values = np.asarray(mean, dtype=np.float64)
+    half = np.asarray(deviation, dtype=np.float64)
+    node = np.arange(1, len(values) + 1)
+    axes.use_sticky_edges = False  # else the lowest band would lie on the frame
+    for shift in (0.0, -period, period) if period else (0.0,):
+        axes.stairs(
+            values + shift + half,
+            np.arange(len(values) + 1) + 0.5,
+            baseline=values + shift - half,
+            fill=True,
+            color=style.lighten(style.BLUE, 0.7),
+        )
+    axes.plot(node, values, ".", color=style.BLUE, markersize=4.0)
+    axes.set_xlim(0, len(values) + 1)
+    spread = np.nanmax(values) - np.nanmin(values)
+    if spread < 1e-3 * max(1.0, float(np.nanmax(np.abs(values)))):
+        # Rounding would fill the panel and look like structure.
+        centre = float(np.nanmean(values))
+        reach = max(0.05 * abs(centre), 1.5 * float(np.nanmax(np.nan_to_num(half))), 1e-3)
+        axes.set_ylim(centre - reach, centre + reach)

@@ -1,0 +1,87 @@
+"""Drawings of oriented rings (paper fig:orient, fig:orient:3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.plot import style
+
+_LARGEST_NUMBERED = 24
+
+
+@style.styled
+def networks(panels: Sequence[tuple[str, ArrayLike]], reference: ArrayLike, n_nodes: int) -> Figure:
+    """Draw rings side by side from (title, links); links that differ from the reference are red.
+
+    links and reference are (N1, 2) arrays of tail and head, 0-based, link by link in one order.
+    """
+    figure = style.new_figure(2.3 * len(panels), 2.5)
+    axes = list(figure.subplots(1, len(panels), squeeze=False)[0])
+    for frame, (title, links) in zip(axes, panels, strict=True):
+        draw_network(frame, links, reference, n_nodes)
+        frame.set_title(title)
+    style.letter(axes)
+    return figure
+
+
+def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: int) -> None:
+    """Put node 1 at the top and go clockwise; each link is a chord with an arrow at its middle."""
+    ends, usual = np.asarray(links, dtype=np.int64), np.asarray(reference, dtype=np.int64)
+    places = node_places(n_nodes)
+    turned = np.any(ends != usual, axis=1)
+    size = min(0.14, 4.0 / len(ends))
+    for chosen, colour, name, order in (
+        (~turned, style.BLACK, "as in the ring", 1.0),
+        (turned, style.RED, "reoriented", 2.0),
+    ):
+        chords = places[ends[chosen]]
+        width = 0.9 if n_nodes <= _LARGEST_NUMBERED else 0.3 * order
+        axes.add_collection(
+            LineCollection(list(chords), colors=colour, linewidths=width, label=name, zorder=order)
+        )
+        heads = PolyCollection(list(arrow_heads(chords, size)), facecolors=colour, zorder=order)
+        heads.set_linewidth(0.0)
+        axes.add_collection(heads)
+    numbered = n_nodes <= _LARGEST_NUMBERED
+    axes.scatter(
+        places[:, 0], places[:, 1], s=150.0 if numbered else 14.0, color="#007a6e", zorder=3.0
+    )
+    for i in range(n_nodes if numbered else 0):
+        axes.text(
+            places[i, 0],
+            places[i, 1] - 0.01,
+            str(i + 1),
+            ha="center",
+            va="center",
+            color="white",
+            fontweight="bold",
+            zorder=4.0,
+        )
+    axes.set_xlim(-1.18, 1.18)
+    axes.set_ylim(-1.18, 1.18)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def node_places(n_nodes: int) -> NDArray[np.float64]:
+    """Return the places (n_nodes, 2) on the unit circle, node 1 at the top, then clockwise."""
+    angle = 0.5 * np.pi - 2.0 * np.pi * np.arange(n_nodes) / n_nodes
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def arrow_heads(chords: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Return triangles (k, 3, 2) at the middle of chords (k, 2, 2), tip towards the head."""
+    along = chords[:, 1] - chords[:, 0]
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    middle = chords.mean(axis=1)
+    tip = middle + 0.5 * size * along
+    left = middle - 0.5 * size * along + 0.38 * size * across
+    right = middle - 0.5 * size * along - 0.38 * size * across
+    return np.stack([tip, left, right], axis=1)

@@ -1,0 +1,90 @@
+"""Runs in the space of variations: three planes and a view in three dimensions.
+
+Paper fig:hvsnmin:orient:1 (b) and fig:hvsnmin:orient:13D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from chimera_hpc.plot import style
+
+LABELS = (r"$V_\theta$", r"$V_a$", r"$V_\Omega$ (1/time)")
+PLANES = ((0, 1), (0, 2), (1, 2))
+
+
+@style.styled
+def projections(
+    triplets: ArrayLike, labels: ArrayLike, names: Sequence[str], *, angle: float = -60.0
+) -> Figure:
+    """Draw three planes and a 3-D view of triplets (n, 3); rows with label -1 are left out."""
+    figure = style.new_figure(style.PAGE, 5.6)
+    grid = figure.add_gridspec(2, 2)
+    flat = [figure.add_subplot(grid[i // 2, i % 2]) for i in range(3)]
+    for axes, plane in zip(flat, PLANES, strict=True):
+        draw_projection(axes, triplets, labels, names, plane)
+    flat[0].legend(handles=style.class_handles(names), loc="best")
+    solid = figure.add_subplot(grid[1, 1], projection="3d")
+    _draw_solid(solid, triplets, labels, names, angle)
+    style.letter([*flat, solid])
+    return figure
+
+
+def draw_projection(
+    axes: Axes,
+    triplets: ArrayLike,
+    labels: ArrayLike,
+    names: Sequence[str],
+    plane: tuple[int, int] = (0, 1),
+    **look: Any,
+) -> None:
+    """Scatter each class over one plane of (V_theta, V_a, V_Omega), not scaled."""
+    x, y = plane
+    points, label = np.asarray(triplets, dtype=np.float64), np.asarray(labels)
+    for i, name in enumerate(names):
+        kwargs: dict[str, Any] = {"color": style.colour_of(name), "alpha": 0.75} | look
+        chosen = points[label == i]
+        axes.scatter(
+            chosen[:, x],
+            chosen[:, y],
+            s=11.0,
+            marker=style.marker_of(name),
+            linewidths=0.0,
+            label=style.spoken(name),
+            rasterized=len(chosen) > 5000,
+            **kwargs,
+        )
+    axes.set_xlabel(LABELS[x])
+    axes.set_ylabel(LABELS[y])
+
+
+def _draw_solid(
+    axes: Any, triplets: ArrayLike, labels: ArrayLike, names: Sequence[str], angle: float
+) -> None:
+    points, label = np.asarray(triplets, dtype=np.float64), np.asarray(labels)
+    for i, name in enumerate(names):
+        x, y, z = points[label == i].T
+        axes.scatter(
+            x,
+            y,
+            z,
+            s=9.0,
+            marker=style.marker_of(name),
+            color=style.colour_of(name),
+            linewidths=0.0,
+        )
+    axes.set_xlabel(LABELS[0], labelpad=-4.0)
+    axes.set_ylabel(LABELS[1], labelpad=-4.0)
+    axes.set_zlabel(LABELS[2], labelpad=-3.0)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(pad=-2.0, labelsize=6.5)
+    axes.view_init(elev=22.0, azim=angle)
+    axes.set_box_aspect((1.2, 1.2, 0.9), zoom=1.05)

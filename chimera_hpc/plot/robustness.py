@@ -1,0 +1,49 @@
+"""Fraction of chimeras after random reorientations, W(Q_r) (paper ratio-o1-o2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from chimera_hpc.plot import style
+
+_LOOKS: dict[str, dict[str, Any]] = {
+    "orientation 1": {"color": style.GREEN, "marker": "*", "markersize": 6.5},
+    "orientation 2": {"color": style.TEAL, "marker": "o", "markersize": 4.0},
+}
+_SPARE = ("#aa3377", "#997700", "#0057b8", "#777777")
+
+
+@dataclass(frozen=True)
+class Band:
+    """A fraction along x with the ends of its interval; every array is (k,)."""
+
+    x: ArrayLike
+    fraction: ArrayLike
+    low: ArrayLike
+    high: ArrayLike
+
+
+@style.styled
+def robustness(
+    curves: Mapping[str, Band], *, label: str = "reoriented links $Q_r$", value: str = "$W$"
+) -> Figure:
+    """Draw each named curve with its band; teal dots orientation 2, green stars orientation 1."""
+    figure = style.new_figure(style.COLUMN + 1.4, 2.8)
+    axes = figure.subplots()
+    spare = iter(_SPARE * (1 + len(curves) // len(_SPARE)))
+    for name, curve in curves.items():
+        look = _LOOKS.get(name) or {"color": next(spare), "marker": "s", "markersize": 3.5}
+        axes.fill_between(
+            curve.x, curve.low, curve.high, color=look["color"], alpha=0.18, linewidth=0.0
+        )
+        axes.plot(curve.x, curve.fraction, linewidth=0.7, markeredgewidth=0.0, label=name, **look)
+    axes.set_ylim(-0.03, 1.03)
+    axes.set_xlabel(label)
+    axes.set_ylabel(value)
+    figure.legend(loc="outside upper center", ncols=min(len(curves), 3))
+    return figure

@@ -1,0 +1,82 @@
+"""Space-time plots of u: node against time (paper fig:9dyn, fig:orient1_otherdyn and others)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.plot import style
+
+Panel = tuple[ArrayLike, ArrayLike]
+
+
+@style.styled
+def space_time(
+    panels: Sequence[Panel],
+    titles: Sequence[str] = (),
+    *,
+    columns: int = 3,
+    zoom: float | None = None,
+    symbol: str = "u_i(t)",
+) -> Figure:
+    """Draw one panel for each (t, u): t (T,) uniform, u (T, N); one colour scale for all.
+
+    `zoom` adds below each panel its last `zoom` time units: fast oscillations blur in print when
+    the window holds more periods than the panel has dots.
+    """
+    columns = min(columns, len(panels))
+    rows = -(-len(panels) // columns)
+    parts = 1 if zoom is None else 2
+    width = style.PAGE if columns > 1 else style.COLUMN + 0.6
+    figure = style.new_figure(width, 0.35 + 1.95 * rows * parts)
+    axes = figure.subplots(rows * parts, columns, squeeze=False, sharey=True)
+    largest = max(float(np.nanmax(np.abs(np.asarray(u)))) for _, u in panels)
+    for i, panel in enumerate(panels):
+        row, column = parts * (i // columns), i % columns
+        image = draw_space_time(axes[row, column], *panel, largest)
+        axes[row, column].set_title(titles[i] if i < len(titles) else "")
+        if zoom is not None:
+            draw_space_time(axes[row + 1, column], *last_part(*panel, zoom), largest)
+    for empty in (
+        axes.reshape(rows, parts, columns).swapaxes(1, 2).reshape(-1, parts)[len(panels) :]
+    ):
+        for spare in empty:
+            spare.set_axis_off()
+    style.letter([axes[parts * (i // columns), i % columns] for i in range(len(panels))])
+    for left in axes[:, 0]:
+        left.set_ylabel("node $i$")
+    for bottom in axes[-1]:
+        bottom.set_xlabel("time $t$")
+    figure.colorbar(image, ax=axes, label=f"${symbol}$", fraction=0.03, pad=0.01)
+    return figure
+
+
+def last_part(
+    t: ArrayLike, u: ArrayLike, duration: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the samples of the last `duration` time units."""
+    time = np.asarray(t, dtype=np.float64)
+    kept = time >= time[-1] - duration
+    return time[kept], np.asarray(u, dtype=np.float64)[kept]
+
+
+def draw_space_time(axes: Axes, t: ArrayLike, u: ArrayLike, largest: float) -> AxesImage:
+    """Draw u (T, N), time along x and node 1 at the bottom; colours from -largest to largest."""
+    time = np.asarray(t, dtype=np.float64)
+    values = np.asarray(u, dtype=np.float64)
+    half = 0.5 * (time[1] - time[0]) if len(time) > 1 else 0.5
+    return axes.imshow(
+        values.T,
+        aspect="auto",
+        origin="lower",
+        extent=(time[0] - half, time[-1] + half, 0.5, values.shape[1] + 0.5),
+        vmin=-largest,
+        vmax=largest,
+        cmap="viridis",
+        interpolation_stage="data",
+    )

@@ -1,0 +1,96 @@
+"""From the discrete spectrum to its parabola (paper fig:FFTsign)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.plot import style
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One window of one node, its amplitude spectrum, and the parabola through three points."""
+
+    t: ArrayLike
+    """(T,)"""
+    y: ArrayLike
+    """(T,)"""
+    frequency: ArrayLike
+    """(K,) frequencies of the discrete spectrum, equally spaced."""
+    amplitude: ArrayLike
+    """(K,)"""
+    peak: int
+    """Index of the largest amplitude, with a neighbour to each side."""
+
+
+@style.styled
+def spectrum(data: Spectrum) -> Figure:
+    """Draw (a) signal, (b) spectrum and parabola, (c) both maxima from near."""
+    figure = style.new_figure(style.PAGE + 0.4, 2.5)
+    axes = list(figure.subplots(1, 3))
+    axes[0].plot(data.t, data.y, color=style.BLUE)
+    axes[0].set_xlabel("time $t$")
+    axes[0].set_ylabel("$y(t)$")
+    _draw_spectrum(axes[1], data, reach=8.0)
+    _draw_spectrum(axes[2], data, reach=1.0)
+    _draw_maxima(axes[2], data)
+    style.letter(axes)
+    return figure
+
+
+def parabola(data: Spectrum) -> NDArray[np.float64]:
+    """Return c2, c1, c0 of the parabola in (frequency - peak frequency) through three points."""
+    around = slice(data.peak - 1, data.peak + 2)
+    frequency = np.asarray(data.frequency, float)
+    offset = frequency[around] - frequency[data.peak]
+    return np.polyfit(offset, np.asarray(data.amplitude, float)[around], 2)
+
+
+def vertex(data: Spectrum) -> tuple[float, float]:
+    """Return frequency and amplitude at the top of the parabola."""
+    curve = parabola(data)
+    offset = -0.5 * curve[1] / curve[0]
+    top = float(np.asarray(data.frequency, float)[data.peak] + offset)
+    return top, float(np.polyval(curve, offset))
+
+
+def _draw_spectrum(axes: Axes, data: Spectrum, reach: float) -> None:
+    """Draw `reach` steps of the spectrum to each side of its peak."""
+    frequency, amplitude = np.asarray(data.frequency, float), np.asarray(data.amplitude, float)
+    step = float(frequency[1] - frequency[0])
+    centre = float(frequency[data.peak])
+    offset = np.linspace(-1.1 * step, 1.1 * step, 201)
+    axes.plot(frequency, amplitude, "--o", color=style.BLUE, markersize=2.5, label="FFT")
+    height = np.polyval(parabola(data), offset)
+    axes.plot(centre + offset, height, color=style.RED, label="parabola")
+    axes.set_xlim(max(centre - 1.1 * reach * step, 0.0), centre + 1.1 * reach * step)
+    axes.set_ylim(0.0, None)
+    axes.set_xlabel("frequency (1/time)")
+    axes.set_ylabel("amplitude")
+
+
+def _draw_maxima(axes: Axes, data: Spectrum) -> None:
+    frequency = float(np.asarray(data.frequency, float)[data.peak])
+    amplitude = float(np.asarray(data.amplitude, float)[data.peak])
+    top = vertex(data)
+    axes.plot(
+        frequency,
+        amplitude,
+        "o",
+        color=style.BLUE,
+        markersize=6.0,
+        label=f"({frequency:.4f}, {amplitude:.4f})",
+    )
+    axes.plot(*top, "s", color=style.BLACK, markersize=5.0, label=f"({top[0]:.4f}, {top[1]:.4f})")
+    step = float(np.diff(np.asarray(data.frequency, float)[:2])[0])
+    reach = max(3.0 * abs(top[0] - frequency), 0.15 * step)
+    curve = np.polyval(parabola(data), [-reach, reach])
+    low, high = float(min(curve.min(), amplitude)), max(top[1], amplitude)
+    axes.set_xlim(frequency - reach, frequency + reach)
+    axes.set_ylim(low - 0.15 * (high - low), high + 0.45 * (high - low))
+    axes.legend(loc="upper center", fontsize=6.5, ncols=2, columnspacing=1.0, handletextpad=0.3)

@@ -1,0 +1,176 @@
+"""Colours, markers, sizes and file writing shared by all figures.
+
+Classes differ by shape as well as by colour, and the colours by lightness as well as by hue, so
+that figures survive colour blindness and grey printing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any, ParamSpec
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+COLUMN = 3.4
+PAGE = 7.0
+"""Widths of one column and of two, in inches."""
+
+RED, BLUE, BLACK, TEAL, GREEN = "#cc3311", "#0057b8", "#111111", "#009988", "#44aa22"
+GREY = "#bdbdbd"
+
+_FAMILIES = {
+    "ordered": (RED, "o"),
+    "chimera": (BLUE, "^"),
+    "disordered": (BLACK, "s"),
+    "steady": (GREY, "X"),
+    "no_window": (GREY, "P"),
+    "multi-chimera": (TEAL, "v"),
+}
+_OTHERS = ((TEAL, "v"), ("#aa3377", "D"), ("#997700", "p"), ("#66ccee", "h"))
+_SHADES = {
+    "ordered": ("#ee8866", "#8f1402", "#f4b8a4", "#5c0a00"),
+    "chimera": ("#6da8e8", "#003a7d", "#a9cdf2", "#00204a"),
+    "disordered": (BLACK, "#8a8a8a", "#555555", "#b0b0b0"),
+}
+
+# Any: matplotlib types its setting names as one long list of literals.
+_SETTINGS: Any = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.7,
+    "axes.grid": False,
+    "axes.axisbelow": True,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.0,
+    "mathtext.fontset": "dejavusans",
+    "figure.constrained_layout.w_pad": 0.05,
+    "figure.constrained_layout.h_pad": 0.05,
+}
+
+Arguments = ParamSpec("Arguments")
+
+
+def styled(make: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
+    """Run a figure function under the project's settings, without a trace in matplotlib's own."""
+
+    @wraps(make)
+    def make_styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Figure:
+        with mpl.rc_context(_SETTINGS):
+            return make(*args, **kwargs)
+
+    return make_styled
+
+
+def new_figure(width: float = PAGE, height: float = 2.4) -> Figure:
+    """Return an empty figure of this size in inches, with the layout that clips nothing."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
+    """Write the figure as PNG (200 dots an inch) and PDF; return both paths.
+
+    Equal figures give equal bytes: no date is written.
+    """
+    stem = Path(path_without_suffix)
+    png, pdf = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".pdf")
+    with mpl.rc_context(_SETTINGS):
+        figure.savefig(png, dpi=200)
+        figure.savefig(pdf, dpi=200, metadata={"CreationDate": None})
+    return png, pdf
+
+
+def family_and_number(name: str) -> tuple[str, int]:
+    """Split a class name into its base class and its number: ``ordered-2`` -> (ordered, 2)."""
+    found = re.fullmatch(r"(.+)-(\d+)", name)
+    return (found.group(1), int(found.group(2))) if found else (name, 0)
+
+
+def colour_of(name: str | None) -> str:
+    """Return the colour of a class; sub-classes are lighter and darker variants of their class."""
+    if name is None:
+        return "#ffffff"
+    family, number = family_and_number(name)
+    if number and family in _SHADES:
+        shades = _SHADES[family]
+        return shades[(number - 1) % len(shades)]
+    return _look(name)[0]
+
+
+def marker_of(name: str | None) -> str:
+    """Return the marker of a class: the same for all sub-classes of a class."""
+    return "." if name is None else _look(name)[1]
+
+
+def _look(name: str) -> tuple[str, str]:
+    family, number = family_and_number(name)
+    if family in _FAMILIES:
+        return _FAMILIES[family]
+    return _OTHERS[(number or sum(map(ord, name))) % len(_OTHERS)]
+
+
+def lighten(colour: str, share: float = 0.6) -> tuple[float, float, float]:
+    """Mix a colour with white."""
+    red, green, blue = (1.0 - share) * np.array(to_rgb(colour)) + share
+    return (float(red), float(green), float(blue))
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Sort class names: ordered, chimera, disordered, others, steady, no window."""
+    known = [*list(_FAMILIES)[:3], "", "steady", "no_window"]
+
+    def place(name: str) -> tuple[int, str, int]:
+        family, number = family_and_number(name)
+        return (known.index(family if family in known else ""), family, number)
+
+    return sorted(set(names), key=place)
+
+
+def spoken(name: str) -> str:
+    """Return a class name as it is written in legends."""
+    return name.replace("_", " ")
+
+
+def class_handles(names: Iterable[str], size: float = 5.0) -> list[Line2D]:
+    """Return legend entries, one a class in the fixed order."""
+    return [
+        Line2D(
+            [],
+            [],
+            linestyle="none",
+            marker=marker_of(name),
+            color=colour_of(name),
+            markersize=size,
+            label=spoken(name),
+        )
+        for name in in_order(names)
+    ]
+
+
+def add_class_legend(figure: Figure, names: Iterable[str], extra: Iterable[Line2D] = ()) -> None:
+    """Put a legend of classes above all panels, in as many rows as the width asks for."""
+    handles = [*class_handles(names), *extra]
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / 1.15)))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def letter(axes: Sequence[Axes]) -> None:
+    """Write (a), (b), ... at the upper left outside of panels, before their titles."""
+    if len(axes) == 1:
+        return
+    for i, panel in enumerate(axes):
+        title = panel.get_title()
+        label = f"({chr(ord('a') + i)})"
+        panel.set_title("")
+        panel.set_title(f"{label}  {title}" if title else label, loc="left")

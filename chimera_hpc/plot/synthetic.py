@@ -1,0 +1,66 @@
+"""Reconstruction of a signal whose features are known (paper fig:FFT)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.plot import style
+
+Quantities = Mapping[str, ArrayLike]
+"""phase, amplitude and frequency, each (N,)."""
+
+_ROWS = (
+    ("phase", r"\theta", "(rad)"),
+    ("amplitude", "a", ""),
+    ("frequency", r"\Omega", "(1/time)"),
+)
+_LOOKS = ((style.GREEN, "."), ("#aa3377", "x"), (style.BLUE, "+"))
+_FLOOR = 1e-17
+
+
+@style.styled
+def reconstruction(truth: Quantities, found: Mapping[str, Quantities]) -> Figure:
+    """Draw true values as black squares, reconstructed ones as dots, and their errors below.
+
+    With one method in `found` the errors have their sign (true - found); with several the panels
+    show absolute values on a logarithmic scale. Errors of phases are taken modulo a turn.
+    """
+    figure = style.new_figure(style.PAGE + 0.4, 4.2)
+    axes = figure.subplots(2, 3, sharex=True)
+    several = len(found) > 1
+    for j, (name, symbol, unit) in enumerate(_ROWS):
+        top, bottom = axes[0, j], axes[1, j]
+        true = np.asarray(truth[name], float)
+        node = np.arange(1, len(true) + 1)
+        top.plot(
+            node, true, "s", color=style.BLACK, markersize=4.5, markerfacecolor="none", label="true"
+        )
+        for (method, values), (colour, marker) in zip(found.items(), _LOOKS, strict=False):
+            error = errors(true, np.asarray(values[name], float), name == "phase")
+            estimate = true - error
+            look = {"color": colour, "marker": marker, "markersize": 3.5, "linestyle": "none"}
+            top.plot(node, estimate, label=method, **look)
+            bottom.plot(node, np.maximum(np.abs(error), _FLOOR) if several else error, **look)
+        mean = rf"\langle {symbol}\rangle"
+        top.set_ylabel(rf"${symbol}_0$, ${mean}$ {unit}".rstrip())
+        difference = rf"{symbol}_0 - {mean}"
+        bottom.set_ylabel((rf"$|{difference}|$" if several else rf"${difference}$") + f" {unit}")
+        bottom.set_yscale("log" if several else "linear")
+        bottom.set_xlabel("node $j$")
+    style.letter(list(axes.flat))
+    figure.align_ylabels(axes)
+    handles, names = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=len(names))
+    return figure
+
+
+def errors(
+    true: NDArray[np.float64], found: NDArray[np.float64], periodic: bool
+) -> NDArray[np.float64]:
+    """Return true - found; for angles the smallest difference, in [-pi, pi)."""
+    difference = true - found
+    return (difference + np.pi) % (2.0 * np.pi) - np.pi if periodic else difference

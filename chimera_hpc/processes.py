@@ -1,0 +1,71 @@
+"""A mark of this very process, by which others on the machine can tell that it is gone."""
+
+from __future__ import annotations
+
+import os
+import socket
+from functools import lru_cache
+from hashlib import blake2b
+from pathlib import Path
+
+_PROC = Path("/proc")
+
+
+def process_mark() -> str:
+    """Return ``machine-pid-start`` of this process, unique over reboots and reuse of numbers.
+
+    It may stand in a file name. `start` is the kernel's start time of the process in clock ticks
+    after boot, or 0 where the system does not tell (no ``/proc``).
+    """
+    pid = os.getpid()
+    return f"{_machine()}-{pid}-{_started(pid) or 0}"
+
+
+def is_gone(mark: str) -> bool:
+    """Whether the marked process has certainly ended: it ran on this machine and is not there.
+
+    False in every doubtful case: another host, another boot, another container, a mark that is not
+    one. A process that was killed and not yet reaped by its parent counts as gone.
+    """
+    machine, _, rest = mark.partition("-")
+    pid, _, start = rest.partition("-")
+    if machine != _machine() or not (pid.isdecimal() and start.isdecimal()):
+        return False
+    started = _started(int(pid))
+    return started is None or started != int(start)
+
+
+@lru_cache(maxsize=1)
+def _machine() -> str:
+    """Digest of host, boot and namespace: equal where process numbers mean the same."""
+    parts = [socket.gethostname()]
+    try:
+        parts.append((_PROC / "sys/kernel/random/boot_id").read_text().strip())
+        parts.append(os.readlink(_PROC / "self/ns/pid"))
+    except OSError:
+        parts.append("no /proc")
+    return blake2b("\n".join(parts).encode(), digest_size=4).hexdigest()
+
+
+def _started(pid: int) -> int | None:
+    """Start of a process in clock ticks after boot, 0 where unknown, None when it is gone."""
+    if not (_PROC / "self/stat").exists():
+        return 0 if _answers(pid) else None
+    try:
+        text = (_PROC / str(pid) / "stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    # The command name, in parentheses, may itself hold spaces and parentheses.
+    fields = text.rpartition(")")[2].split()
+    state, start = fields[0], fields[19]
+    return None if state in "ZX" else int(start)
+
+
+def _answers(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True

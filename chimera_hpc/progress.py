@@ -1,0 +1,106 @@
+"""Telling how a run goes: a bar on a terminal, plain lines elsewhere, the same lines in run.log."""
+
+from __future__ import annotations
+
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self, TextIO
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+LINE_SECONDS = 10.0
+"""Plain lines come this often, and at the end."""
+
+
+class Reporter:
+    """Counts points as blocks end and shows the count, the rate and the time to go."""
+
+    def __init__(self, total: int, log: Path | None = None, stream: TextIO | None = None) -> None:
+        """Count up to ``total`` points; ``log`` gets a copy of every line."""
+        self.total, self.done, self.failed = total, 0, 0
+        self._at_start = 0
+        self._began = time.monotonic()
+        self._last_line = self._began
+        self._stream = stream or sys.stderr
+        self._log = log.open("a", encoding="utf-8") if log is not None else None
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> Self:
+        """Show the bar, on a terminal."""
+        if self._stream.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+            from rich.progress import TimeElapsedColumn, TimeRemainingColumn
+
+            self._bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[rate]}"),
+                TextColumn("left"),
+                TimeRemainingColumn(),
+                TextColumn("after"),
+                TimeElapsedColumn(),
+                console=Console(file=self._stream),
+            )
+            self._task = self._bar.add_task("points", total=self.total, completed=0, rate="")
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Take the bar away and close the log."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+        if self._log is not None:
+            self._log.close()
+            self._log = None
+
+    def begin(self, done: int) -> None:
+        """Begin to measure the rate, with ``done`` points there already."""
+        self.done = self._at_start = done
+        self._began = time.monotonic()
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, completed=done)
+
+    def say(self, line: str) -> None:
+        """Write a line for people, and with its time into the log."""
+        if self._bar is not None:
+            self._bar.console.print(line, highlight=False, markup=False)
+        else:
+            print(line, file=self._stream, flush=True)
+        self.note(line)
+
+    def note(self, line: str) -> None:
+        """Write a line into the log only."""
+        if self._log is not None:
+            stamp = datetime.now(UTC).isoformat(timespec="seconds")
+            self._log.write(f"{stamp} {line}\n")
+            self._log.flush()
+
+    def add(self, n_done: int, n_failed: int) -> None:
+        """Count the points of a block that has ended."""
+        self.done += n_done + n_failed
+        self.failed += n_failed
+        elapsed = time.monotonic() - self._began
+        rate = (self.done - self._at_start) / max(elapsed, 1e-9)
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, completed=0, rate=f"{rate:.1f}/s")
+        elif time.monotonic() - self._last_line > LINE_SECONDS or self.done >= self.total:
+            self._last_line = time.monotonic()
+            left = (self.total - self.done) / max(rate, 1e-9)
+            failures = f", {self.failed} failed" if self.failed else ""
+            self.say(
+                f"{self.done} of {self.total} points{failures}, {rate:.1f} points/s, "
+                f"{left:.0f} s to go"
+            )

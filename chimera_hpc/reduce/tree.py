@@ -1,0 +1,114 @@
+"""One tree of merges (dendrogram): how it is grown, cut, and read from the top."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.cluster import hierarchy
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+Linkage = Literal["ward", "average", "complete"]
+LINKAGES: tuple[Linkage, ...] = ("ward", "average", "complete")
+
+
+def limits(points: Floats) -> Floats:
+    """Return the smallest and largest value of each column, shape (2, n_columns)."""
+    if len(points) == 0:
+        return np.zeros((2, points.shape[1]))
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def scale(points: Floats, scaler: Floats) -> Floats:
+    """Map each column affinely so that `scaler` (2, n_columns) goes to 0 and 1.
+
+    Equal to scikit-learn's ``MinMaxScaler``; a constant column goes to 0. Points outside the limits
+    fall outside [0, 1] and are not clipped.
+    """
+    span = scaler[1] - scaler[0]
+    scaled: Floats = (points - scaler[0]) / np.where(span > 0.0, span, 1.0)
+    return scaled
+
+
+def grow(scaled: Floats, method: Linkage) -> Floats:
+    """Return SciPy's linkage matrix (m - 1, 4) of m points; (0, 4) for fewer than two.
+
+    Row i merges two clusters into cluster m + i at the height in column 2; heights never fall
+    (true of ward, average and complete linkage). Takes O(m^2) memory.
+    """
+    if len(scaled) < 2:
+        return np.empty((0, 4))
+    return np.asarray(hierarchy.linkage(scaled, method=method), dtype=np.float64)
+
+
+def separable(tree: Floats) -> int:
+    """Return the largest number of clusters that does not part equal points."""
+    return 1 + int(np.count_nonzero(tree[:, 2] > 0.0))
+
+
+def clusters_at(tree: Floats, depth: float) -> int:
+    """Return the number of clusters that a line at height `depth` cuts the tree into."""
+    return 1 + int(np.count_nonzero(tree[:, 2] > depth))
+
+
+def cut(tree: Floats, n_clusters: int) -> Integers:
+    """Undo the last ``n_clusters - 1`` merges and number the clusters of the m leaves from 0.
+
+    Clusters of a finer cut lie inside those of a coarser one. Fewer clusters come back when the
+    tree holds fewer different points.
+    """
+    n_leaves = len(tree) + 1
+    owner = np.arange(2 * n_leaves - 1)
+    children = tree[:, :2].astype(np.int64)
+    kept = len(tree) - (min(n_clusters, separable(tree)) - 1)
+    for row in range(kept - 1, -1, -1):
+        owner[children[row]] = owner[n_leaves + row]
+    return np.unique(owner[:n_leaves], return_inverse=True)[1].astype(np.int64)
+
+
+def middle_height(tree: Floats, n_clusters: int) -> float:
+    """Return a height at which a line cuts the tree into `n_clusters`: half-way between two merges.
+
+    Above the root (by a twentieth of its height) for one cluster.
+    """
+    heights = np.concatenate([[0.0], tree[:, 2]])
+    undone = min(n_clusters, separable(tree)) - 1
+    if undone == 0:
+        return 1.05 * float(heights[-1])
+    return 0.5 * float(heights[-1 - undone] + heights[-undone])
+
+
+@dataclass(frozen=True)
+class Split:
+    """One event as the depth threshold falls: at `depth` a cluster of class `name` parts in two."""
+
+    depth: float
+    n_clusters: int
+    """Number of clusters below the event."""
+    name: str
+    """The class, among those of the starting cut, that the parted cluster belongs to."""
+    sizes: tuple[int, int]
+    """Leaves in the two parts, larger first."""
+
+
+def splits_below(
+    tree: Floats, leaf_labels: Integers, names: tuple[str, ...], until: int
+) -> tuple[Split, ...]:
+    """List the splits below the cut that gave `leaf_labels` (m,), down to `until` clusters."""
+    n_leaves = len(tree) + 1
+    size = np.concatenate([np.ones(n_leaves), tree[:, 3]]).astype(np.int64)
+    first_leaf = np.arange(2 * n_leaves - 1)
+    children = tree[:, :2].astype(np.int64)
+    for row in range(len(tree)):
+        first_leaf[n_leaves + row] = first_leaf[children[row, 0]]
+    found = []
+    for n_clusters in range(max(len(names), 1) + 1, min(until, separable(tree)) + 1):
+        row = len(tree) - (n_clusters - 1)
+        parts = sorted((int(size[child]) for child in children[row]), reverse=True)
+        name = names[leaf_labels[first_leaf[n_leaves + row]]]
+        found.append(Split(float(tree[row, 2]), n_clusters, name, (parts[0], parts[1])))
+    return tuple(found)

@@ -1,0 +1,151 @@
+"""Stores that grow: new points behind the old ones, and what puts a half-changed store right."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from chimera_hpc.claims import claim_block
+from chimera_hpc.errors import BadInput
+from chimera_hpc.files import sync_tree, write_atomically
+from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.layout import BLOCK_ARRAYS
+from chimera_hpc.ledger import METADATA
+from chimera_hpc.store.template import REDUCTION, root_attributes, write_coordinates, write_root
+
+_CLAIM = "metadata"
+_EXPIRY = 20.0
+"""Seconds after which a change by another machine counts as broken off; it takes one or two."""
+_PATIENCE = 30.0
+"""Seconds to wait for others."""
+_SAME_TABLES = ("model", "integrator", "features", "keep")
+
+
+def points_of(sweeps: Sequence[Sweep]) -> Points:
+    """Return the points of the first sweep, then the new ones of each later sweep."""
+    points = sweeps[0].points()
+    for sweep in sweeps[1:]:
+        points = _appended(points, sweep.points())
+    return points
+
+
+@contextlib.contextmanager
+def exclusive(path: Path) -> Iterator[None]:
+    """Let this process alone change the metadata of a store; BadInput when others do all the time.
+
+    What was read of the metadata before may be out of date by now.
+    """
+    deadline = time.monotonic() + _PATIENCE
+    while (claim := claim_block(path, _CLAIM, run=0, expiry=_EXPIRY)) is None:
+        if time.monotonic() > deadline:
+            raise BadInput(f"{path}: somebody else keeps changing the store; try again later")
+        time.sleep(0.1)
+    try:
+        yield
+    finally:
+        claim.release()
+
+
+def extend(path: Path, sweeps: Sequence[Sweep], sweep: Sweep, block_size: int) -> None:
+    """Add to a store the points of `sweep` that it does not have, behind the others.
+
+    The arrays' own metadata and the coordinates come first; the root, which is what counts, last.
+    So a reader sees the old store or the new one, and a killed extension has not happened.
+    Raises BadInput unless `sweep` holds all points of the store and differs in its axes only.
+    """
+    if sweep.digest == sweeps[-1].digest:
+        return
+    old = points_of(sweeps)
+    _check_extension(path, sweeps[-1], old, sweep)
+    new = points_of([*sweeps, sweep])
+    for folder in (*new.columns, *BLOCK_ARRAYS):
+        file = path / folder / METADATA
+        if file.exists():
+            node = json.loads(file.read_bytes())
+            node["shape"][0] = len(new)
+            write_atomically(file, json.dumps(node, indent=1).encode())
+    write_coordinates(path, sweep, new.columns)
+    for name in new.columns:
+        sync_tree(path / name)
+    write_root(path, root_attributes([*sweeps, sweep], len(new), block_size))
+
+
+def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: Points) -> list[str]:
+    """Write anew what differs from the root metadata of a store; return a line each.
+
+    `root` are the metadata that count: those of the file, or of its copy when the file is damaged.
+    """
+    done = []
+    if _json(path / METADATA) != root:
+        write_atomically(path / METADATA, json.dumps(root, indent=1).encode())
+        done.append(f"{METADATA} written anew")
+    for name, node in root["consolidated_metadata"]["metadata"].items():
+        file = path / name / METADATA
+        own = node if node["node_type"] == "array" else None
+        if own is not None and name.partition("/")[0] != REDUCTION and _json(file) != own:
+            write_atomically(file, json.dumps(own, indent=1).encode())
+            done.append(f"{name}/{METADATA} written anew")
+    if not _coordinates_hold(path, points):
+        write_coordinates(path, sweep, points.columns)
+        done.append("coordinates written anew")
+    return done
+
+
+def _check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> None:
+    changed = [name for name in _SAME_TABLES if getattr(sweep, name) != getattr(before, name)]
+    if sweep.n_nodes != before.n_nodes:
+        changed.append("fixed.n_nodes")
+    if changed:
+        raise BadInput(f"{path}: an extension may change axes only, not {', '.join(changed)}")
+    new = sweep.points()
+    missing = np.flatnonzero(~np.isin(_keys(old), _keys(new, old)))
+    if len(missing):
+        row = ", ".join(f"{name}={value}" for name, value in old.row(int(missing[0])).items())
+        raise BadInput(f"{path}: an extension must hold all points of the store, not so {row}")
+    if sweep.keep.series == "first-seed" and new.row(0)["seed"] != old.row(0)["seed"]:
+        raise BadInput(f"{path}: an extension may not change the first seed, whose series is kept")
+
+
+def _appended(points: Points, more: Points) -> Points:
+    new = ~np.isin(_keys(more, points), _keys(points))
+    columns = {
+        name: np.concatenate([column, more.columns[name][new]])
+        for name, column in points.columns.items()
+    }
+    return Points(columns, more.axes)
+
+
+def _keys(points: Points, like: Points | None = None) -> NDArray[np.void]:
+    """Return each point as its bytes, in the order of the columns of `like`."""
+    # Adding 0 turns -0.0 into 0.0, which is the same parameter.
+    rows = [(points.columns[name] + 0).view(np.int64) for name in (like or points).columns]
+    table = np.ascontiguousarray(np.stack(rows, axis=1))
+    keys: NDArray[np.void] = table.view(np.dtype((np.void, 8 * len(rows))))[:, 0]
+    return keys
+
+
+def _coordinates_hold(path: Path, points: Points) -> bool:
+    try:
+        group = zarr.open_group(path, mode="r")
+        return all(
+            np.array_equal(np.asarray(group[name]), column)
+            for name, column in points.columns.items()
+        )
+    except Exception:
+        # However it fails, they cannot be read.
+        return False
+
+
+def _json(file: Path) -> Any:
+    try:
+        return json.loads(file.read_bytes())
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,61 @@
+"""A store as one labelled dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from chimera_hpc.status import Status
+from chimera_hpc.store.store import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+STORE_NAME = "store.zarr"
+"""Name of the store in the folder of a sweep."""
+
+
+def open_sweep(path: str | Path) -> xr.Dataset:
+    """Open the folder of a sweep, or its store, as a dataset with one named variable a quantity.
+
+    Features become ``amplitude(point, node)`` and so on, scalars ``V_theta(point)``, the ledger's
+    fields ``status(point)``; coordinates are the parameters and `cell`, the number of the point's
+    combination of all parameters but the seed: ``set_index(point=["cell", "seed"]).unstack()``
+    makes them dimensions. `u` and features are read when used. Raises BadInput when there is no
+    store.
+    """
+    # xarray takes half a second to import, and a worker has no use for it.
+    import xarray as xr
+
+    store = Store.open(_store_in(Path(path)))
+    stored = xr.open_zarr(store.path, chunks=None)
+    ledger = store.ledger()
+    dataset: xr.Dataset = stored.drop_vars(["features", "scalars", "ledger"])
+    dataset = dataset.assign_coords(cell=("point", store.points.cells()[0], _attributes("cell")))
+    features = stored["features"]
+    never = ledger["status"] == Status.NEVER
+    if never.any():
+        # Chunks that were written before their ledger chunk could be are no results.
+        features = features.where(xr.DataArray(~never, dims="point"))
+    for k, (label, unit) in enumerate(_labels(stored["features"])):
+        dataset[label] = features.isel(feature=k).assign_attrs(_attributes(label, unit))
+    tables: dict[str, Mapping[str, NDArray[Any]]] = {"scalars": store.scalars(), "ledger": ledger}
+    for name, columns in tables.items():
+        for label, unit in _labels(stored[name]):
+            dataset[label] = ("point", columns[label], _attributes(label, unit))
+    return dataset
+
+
+def _store_in(path: Path) -> Path:
+    return path / STORE_NAME if (path / STORE_NAME).is_dir() else path
+
+
+def _labels(array: xr.DataArray) -> list[tuple[str, str]]:
+    return list(zip(array.attrs["labels"], array.attrs["label_units"], strict=True))
+
+
+def _attributes(label: str, unit: str = "1") -> dict[str, str]:
+    return {"units": unit, "long_name": label.replace("_", " ")}

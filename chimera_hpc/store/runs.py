@@ -1,0 +1,52 @@
+"""One small file a run in the folder `runs` of a store: who wrote which points, with what, when."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.files import create_exclusively
+
+FOLDER = "runs"
+
+
+def start_run(path: Path, info: Mapping[str, Any]) -> int:
+    """Create ``runs/<number>.json`` with `info` and return its number, which no other run has.
+
+    Numbers count from 1; the ledger's field `run` holds them.
+    """
+    folder = path / FOLDER
+    folder.mkdir(exist_ok=True)
+    number = max(run_numbers(path), default=0) + 1
+    while not create_exclusively(_file(path, number), _content(number, info)):
+        number += 1
+    return number
+
+
+def run_numbers(path: Path) -> list[int]:
+    """Return the numbers of all runs, rising."""
+    folder = path / FOLDER
+    names = os.listdir(folder) if folder.is_dir() else []
+    parts = [name.removesuffix(".json") for name in names if name.endswith(".json")]
+    return sorted(int(part) for part in parts if part.isdecimal())
+
+
+def read_run(path: Path, number: int) -> dict[str, Any]:
+    """Return what a run wrote about itself; raise BadInput when it is not there or unreadable."""
+    try:
+        info = json.loads(_file(path, number).read_bytes())
+    except (OSError, ValueError):
+        raise BadInput(f"{path}: run {number} has left no readable record") from None
+    return dict(info)
+
+
+def _file(path: Path, number: int) -> Path:
+    return path / FOLDER / f"{number}.json"
+
+
+def _content(number: int, info: Mapping[str, Any]) -> bytes:
+    return json.dumps({"run": number, **info}, indent=1).encode()

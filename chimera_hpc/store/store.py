@@ -1,0 +1,297 @@
+"""The store of a sweep: the only truth about what is done."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.claims import FOLDER as CLAIMS
+from chimera_hpc.claims import Claim, remove_stale
+from chimera_hpc.errors import BadInput
+from chimera_hpc.files import remove_leftovers
+from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.layout import BLOCK_ARRAYS, scalar_labels, series_mask
+from chimera_hpc.ledger import (
+    FAILED,
+    LedgerScan,
+    ledger_shape,
+    read_block,
+    read_copy,
+    read_metadata,
+    scan_ledger,
+    table_columns,
+    unfinished,
+)
+from chimera_hpc.status import Status
+from chimera_hpc.store.blocks import BlockFiles, Damage
+from chimera_hpc.store.check import find_damaged, shallow_damage
+from chimera_hpc.store.extension import exclusive, extend, points_of, repair_metadata
+from chimera_hpc.store.read import gather, read_series
+from chimera_hpc.store.reduction import Reduction, Variable, read_reduction, write_reduction
+from chimera_hpc.store.runs import FOLDER as RUNS
+from chimera_hpc.store.runs import start_run
+from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
+from chimera_hpc.store.write import Receipt, write_block
+
+if TYPE_CHECKING:
+    from chimera_hpc.task import BlockResult
+
+_NO_LIMIT = 2**62
+_FREE_TABLES = ("name", "title", "reduction", "run", "slurm")
+"""What a job may change between two runs on one store."""
+
+
+class Store:
+    """One sweep's results on disk, block by block; make one with `plan` or `open`.
+
+    A block is written whole: `u`, `features`, `scalars`, then the ledger, so that what the ledger
+    vouches for is on the disk. Results are never overwritten: a late or repeated write of a block
+    leaves every finished row as it is.
+    """
+
+    def __init__(self, path: Path, metadata: Mapping[str, Any], sweep: Sweep) -> None:
+        """Take the store at `path` with this root metadata and the sweep they describe."""
+        self.path = path
+        self.metadata = metadata
+        self.sweep = sweep
+        self.n_points, self.block_size = ledger_shape(metadata)
+        self.files = BlockFiles.of(path, sweep, self.block_size)
+
+    @classmethod
+    def plan(cls, path: str | Path, sweep: Sweep) -> Self:
+        """Create the store of a sweep, all of it or nothing; BadInput when the path exists."""
+        write_template(Path(path), sweep)
+        return cls.open(path)
+
+    @classmethod
+    def open(cls, path: str | Path) -> Self:
+        """Open a store; BadInput when the path is not one or its attributes are beyond repair."""
+        path = Path(path)
+        metadata = read_metadata(path)
+        try:
+            sweep = check_root(path, metadata)
+        except BadInput:
+            copy = read_copy(path)
+            if copy is None:
+                raise
+            metadata, sweep = copy, check_root(path, copy)
+        return cls(path, metadata, sweep)
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks."""
+        return -(-self.n_points // self.block_size)
+
+    def block(self, i: int) -> tuple[int, int]:
+        """Return the first point of block i and the one after its last."""
+        if not 0 <= i < self.n_blocks:
+            raise IndexError(f"block {i} of {self.n_blocks}")
+        return i * self.block_size, min((i + 1) * self.block_size, self.n_points)
+
+    @cached_property
+    def sweeps(self) -> tuple[Sweep, ...]:
+        """The sweep as it was planned first, then each extension."""
+        specs = self.metadata["attributes"]["specs"]
+        return tuple(Sweep.from_dict(spec, where=str(self.path)) for spec in specs)
+
+    @cached_property
+    def points(self) -> Points:
+        """All points, in the order of the store."""
+        return points_of(self.sweeps)
+
+    def check_spec(self, sweep: Sweep) -> None:
+        """Raise BadInput, naming the keys that differ, unless the store was made for this sweep.
+
+        A sweep that was extended since is accepted as it was before.
+        """
+        if sweep.digest not in {known.digest for known in self.sweeps}:
+            lines = "; ".join(sweep.explain_difference(self.sweep))
+            raise BadInput(f"{self.path}: holds another sweep: {lines}")
+        if sweep.keep != self.sweep.keep:
+            kept = f"series={self.sweep.keep.series}, dtype={self.sweep.keep.dtype}"
+            raise BadInput(f"{self.path}: keep may not change within one store, it has {kept}")
+
+    def adopt(self, sweep: Sweep) -> Self:
+        """Check the sweep, take over what may change between runs, and return the store."""
+        self.check_spec(sweep)
+        changes = {name: getattr(sweep, name) for name in _FREE_TABLES}
+        if self.sweep.model_copy(update=changes) == self.sweep:
+            return self
+        with exclusive(self.path):
+            present = self.open(self.path)
+            sweeps = (*present.sweeps[:-1], present.sweep.model_copy(update=changes))
+            attributes = root_attributes(sweeps, present.n_points, self.block_size)
+            consolidate(self.path, attributes)
+        return self.open(self.path)
+
+    def extend(self, sweep: Sweep) -> Self:
+        """Add the points of `sweep` that are not in the store, behind the others; return the store.
+
+        Finished points are not touched. `sweep` must hold all points of the store and differ in
+        its axes only; else BadInput. Killed half-way, it has not happened and can be done again.
+        """
+        with exclusive(self.path):
+            present = self.open(self.path)
+            extend(self.path, present.sweeps, sweep, self.block_size)
+        return self.open(self.path)
+
+    # What is done, and what is to do
+
+    def scan(self) -> LedgerScan:
+        """Read the ledger and say which of its chunks are damaged."""
+        return scan_ledger(self.path, self.metadata)
+
+    def ledger(self) -> dict[str, NDArray[np.int64]]:
+        """Return the ledger's columns, one entry a point; status 255 where a point never ran."""
+        return self.scan().columns
+
+    def status(self) -> dict[Status, int]:
+        """Count the points by outcome."""
+        codes = self.ledger()["status"]
+        return {status: int(np.count_nonzero(codes == status)) for status in Status}
+
+    def pending(
+        self,
+        retry_failed: bool = False,
+        *,
+        attempts: int | None = None,
+        statuses: Collection[Status] = FAILED,
+    ) -> list[int]:
+        """Return the blocks that have something to do: points that never ran, or damaged chunks.
+
+        With `retry_failed` also those with failed points, if `attempts` is given only with points
+        that were tried fewer times; `statuses` limits which failures count.
+        """
+        scan = self.scan()
+        limit = (_NO_LIMIT if attempts is None else attempts) if retry_failed else 0
+        to_do = np.flatnonzero(unfinished(scan.columns, limit, statuses)) // self.block_size
+        damaged = {damage.block for damage in find_damaged(self.files, scan)}
+        return sorted({*np.unique(to_do).tolist(), *damaged})
+
+    def points_to_do(
+        self, i: int, attempts: int = 0, statuses: Collection[Status] = FAILED
+    ) -> NDArray[np.int64]:
+        """Return which points of block i, counted within it, are to be run.
+
+        These are the points that never ran, those that failed fewer than `attempts` times, and all
+        of them when a chunk of the block is damaged.
+        """
+        start, stop = self.block(i)
+        table = read_block(self.path, i, self.block_size)
+        if table is None or shallow_damage(self.files, i):
+            return np.arange(stop - start)
+        columns = table_columns(table[: stop - start])
+        return np.flatnonzero(unfinished(columns, attempts, statuses))
+
+    def find_damaged(self, deep: bool = False, patience: float = 0.0) -> list[Damage]:
+        """Return the damaged chunks, by presence and length or, if `deep`, decoding every byte.
+
+        Missing files are looked for again until `patience` seconds are over: network file systems
+        show new files late.
+        """
+        return find_damaged(self.files, self.scan(), deep=deep, patience=patience)
+
+    def discard_block(self, i: int) -> None:
+        """Forget that block i was ever run; its chunks stay until they are written again."""
+        self.files.file("ledger", i).unlink(missing_ok=True)
+
+    def repair(self) -> list[str]:
+        """Put right what any process can, and return what that was, a line each.
+
+        Damaged metadata and coordinates are written anew; the temporary files of processes that
+        are gone are removed, and their claims on finished blocks. Damaged blocks are not touched:
+        `pending` lists them.
+        """
+        folders = (self.path, *(self.path / name for name in (*BLOCK_ARRAYS, CLAIMS, RUNS)))
+        count = sum(remove_leftovers(folder) for folder in folders)
+        done = [f"{count} temporary files removed"] if count else []
+        finished = set(range(self.n_blocks)) - set(self.pending())
+        stale = remove_stale(self.path, finished)
+        done += [f"{stale} claims on finished blocks removed"] if stale else []
+        with exclusive(self.path):
+            present = self.open(self.path)
+            return done + repair_metadata(
+                self.path, present.metadata, present.sweep, present.points
+            )
+
+    # Writing
+
+    def start_run(self, info: Mapping[str, Any]) -> int:
+        """Record a run (see `chimera_hpc.provenance`) and return its number for the ledger."""
+        return start_run(self.path, info)
+
+    def write_block(
+        self,
+        i: int,
+        result: BlockResult,
+        run: int,
+        attempts: int,
+        claim: Claim | None = None,
+        rows: Sequence[int] | NDArray[np.int64] | None = None,
+    ) -> Receipt:
+        """Write a block, or only some of its points, and return the receipt.
+
+        Parameters
+        ----------
+        i : block
+        result : results of the points in `rows`, in their order; those with status 255 did not run
+        run : number from `start_run`
+        attempts : tries of these points since the block was last written, added to the ledger's
+        claim : the right to write the block; ClaimLost is raised when somebody else has it by now
+        rows : points counted within the block; all of them when not given
+        """
+        start, stop = self.block(i)
+        where = range(stop - start) if rows is None else rows
+        return write_block(self.files, i, result, run, attempts, where, claim)
+
+    # Reading
+
+    def features(self) -> NDArray[np.float64]:
+        """Return the features, shape (n_points, 8, n_nodes); NaN where a point never ran.
+
+        Raises DamagedChunk rather than give NaN for what was there.
+        """
+        return gather(self.files, "features", self.scan())
+
+    def scalars(self) -> dict[str, NDArray[np.float64]]:
+        """Return each quantity over all points by its name; NaN where a point never ran."""
+        table = gather(self.files, "scalars", self.scan())
+        labels = scalar_labels(self.sweep.features.groups)
+        return {label: table[:, k] for k, label in enumerate(labels)}
+
+    def series(self, i: int) -> NDArray[np.float64]:
+        """Return u of point i over the analysis interval, shape (times, nodes).
+
+        Raises BadInput when the series of the point is not kept, or it never ran.
+        """
+        i = range(self.n_points)[i]
+        if not series_mask(self.sweep, self.points.columns["seed"][i : i + 1]).all():
+            raise BadInput(f"{self.path}: the series of point {i} is not kept")
+        return read_series(self.files, i)
+
+    # Reduction
+
+    def reduction(self) -> Reduction:
+        """Return what the last reduction stored; BadInput when there is none."""
+        return read_reduction(self.path)
+
+    def write_reduction(
+        self, variables: Mapping[str, Variable], attributes: Mapping[str, Any]
+    ) -> None:
+        """Replace the group `reduction`: ``name: (dimensions, values[, attributes])``, attributes.
+
+        No strings as values: Zarr v3 has no settled type for them; put them into attributes.
+        """
+        with exclusive(self.path):
+            write_reduction(self.path, variables, attributes)
+            consolidate(self.path)
+
+    def consolidate(self) -> None:
+        """Gather the metadata of the reduction in the root, as `write_reduction` does."""
+        with exclusive(self.path):
+            consolidate(self.path)

@@ -1,0 +1,212 @@
+"""The template of a store: arrays, attributes and coordinates, before any point is run."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import zarr
+from numpy.typing import NDArray
+from zarr.codecs import BloscCodec, Crc32cCodec, TransposeCodec, ZstdCodec
+from zarr.storage import StoreLike
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.files import (
+    remove_leftovers,
+    sync_folder,
+    sync_tree,
+    temporary_name,
+    write_atomically,
+)
+from chimera_hpc.grid import Sweep, block_size
+from chimera_hpc.layout import (
+    BLOCK_ARRAYS,
+    ArrayPlan,
+    array_plans,
+    block_plans,
+    sample_times,
+)
+from chimera_hpc.ledger import METADATA, METADATA_COPY, SEPARATOR, read_metadata, seal
+from chimera_hpc.streams import STREAM_TAG
+
+SCHEMA = 1
+"""Version of the store's layout, in its root attributes."""
+REDUCTION = "reduction"
+"""Group of what was made of the points."""
+
+
+def write_template(path: Path, sweep: Sweep) -> None:
+    """Create the store of a sweep; all of it or nothing.
+
+    It is built under a temporary name in the same folder, flushed to the disk and renamed.
+    Raises BadInput when the path exists or cannot be written.
+    """
+    if path.exists():
+        raise BadInput(f"{path}: exists already, a new store needs a new name")
+    temporary = temporary_name(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(path.parent)
+        _build(temporary, sweep)
+        sync_tree(temporary)
+        os.rename(temporary, path)
+        sync_folder(path.parent)
+    except OSError as error:
+        # Where somebody else was faster, the rename fails: his folder is not empty.
+        raise BadInput(f"{path}: no store can be made here: {_reason(error)}") from None
+
+
+def root_attributes(sweeps: Sequence[Sweep], n_points: int, size: int) -> dict[str, Any]:
+    """Return the attributes of the whole store; `sweeps` are the first plan and its extensions."""
+    latest = sweeps[-1]
+    return {
+        "title": latest.title or latest.name,
+        "schema": SCHEMA,
+        "spec": latest.to_dict(),
+        "digest": latest.digest,
+        "specs": [sweep.to_dict() for sweep in sweeps],
+        "stream_tag": STREAM_TAG,
+        "n_points": n_points,
+        "block_size": size,
+    }
+
+
+def write_root(path: Path, attributes: Mapping[str, Any]) -> None:
+    """Write the root metadata with the metadata of all arrays as they are now.
+
+    This is the moment from which a plan or an extension counts.
+    """
+    _write_root(path, attributes, _nodes(path, "*") | _nodes(path, f"{REDUCTION}/*"))
+
+
+def consolidate(path: Path, attributes: Mapping[str, Any] | None = None) -> None:
+    """Write the root metadata anew, with the present reduction and with new attributes if given.
+
+    What is known of the other arrays stays: an extension that was killed has altered their own
+    files already, but does not count.
+    """
+    root = read_metadata(path)
+    known = root["consolidated_metadata"]["metadata"]
+    nodes = {n: node for n, node in known.items() if n.partition("/")[0] != REDUCTION}
+    nodes |= _nodes(path, REDUCTION) | _nodes(path, f"{REDUCTION}/*")
+    _write_root(path, root["attributes"] if attributes is None else attributes, nodes)
+
+
+def check_root(path: Path, root: Mapping[str, Any]) -> Sweep:
+    """Return the sweep that root metadata describe; BadInput when they contradict themselves."""
+    attributes, nodes = root["attributes"], root["consolidated_metadata"]["metadata"]
+    sweep = Sweep.from_dict(attributes["spec"], where=str(path))
+    specs = attributes.get("specs")
+    if sweep.digest != attributes["digest"] or not isinstance(specs, list) or not specs:
+        raise BadInput(f"{path}: the attributes spec, specs and digest do not belong together")
+    for spec in specs:
+        Sweep.from_dict(spec, where=str(path))
+    for plan in block_plans(sweep, attributes["n_points"], attributes["block_size"]):
+        if not _matches(nodes.get(plan.name), plan):
+            raise BadInput(f"{path}: the metadata of {plan.name} are damaged")
+    return sweep
+
+
+def create_array(store: StoreLike, plan: ArrayPlan) -> zarr.Array[Any]:
+    """Create an empty array as planned, with a checksum in every chunk, inside shards too."""
+    options: dict[str, Any] = {"chunks": plan.chunks, "filters": None}
+    if plan.name == "u":
+        # Time runs fastest and the bytes of a number are split, else hardly anything is gained.
+        shuffled = BloscCodec(cname="lz4", clevel=5, shuffle="shuffle")
+        options = {"chunks": (1, *plan.chunks[1:]), "shards": plan.chunks}
+        options["filters"] = [TransposeCodec(order=(0, 2, 1))]
+        options["compressors"] = [shuffled, Crc32cCodec()]
+    elif plan.name in BLOCK_ARRAYS:
+        options["compressors"] = [Crc32cCodec()]
+    else:
+        options["compressors"] = [ZstdCodec(level=3), Crc32cCodec()]
+    return zarr.create_array(
+        store,
+        name=plan.name,
+        shape=plan.shape,
+        dtype=plan.dtype,
+        fill_value=plan.fill,
+        dimension_names=plan.dimensions,
+        attributes=dict(plan.attributes),
+        chunk_key_encoding={"name": "default", "separator": SEPARATOR},
+        **options,
+    )
+
+
+def write_coordinates(path: Path, sweep: Sweep, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Write the coordinates over `point`, and the sampling times where series are kept."""
+    group = zarr.open_group(path, mode="r+", use_consolidated=False)
+    for name, column in columns.items():
+        _array(group, name)[:] = column
+    if sweep.keep.series != "none":
+        _array(group, "time")[:] = sample_times(sweep)
+
+
+def _build(path: Path, sweep: Sweep) -> None:
+    columns = sweep.points().columns
+    n_points = len(columns["seed"])
+    size = block_size(sweep, n_points)
+    zarr.create_group(path)
+    for plan in array_plans(sweep, columns, size):
+        create_array(path, plan)
+    write_coordinates(path, sweep, columns)
+    write_root(path, root_attributes([sweep], n_points, size))
+
+
+def _reason(error: OSError) -> str:
+    return f"{error.strerror} ({error.filename})" if error.filename else str(error.strerror)
+
+
+def _matches(node: Any, plan: ArrayPlan) -> bool:
+    try:
+        chunks = node["chunk_grid"]["configuration"]["chunk_shape"]
+        found = (tuple(node["shape"]), tuple(chunks), node["data_type"], node["dimension_names"])
+    except (KeyError, TypeError):
+        return False
+    return found == (plan.shape, plan.chunks, plan.dtype, list(plan.dimensions))
+
+
+def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+    found = group[name]
+    assert isinstance(found, zarr.Array)
+    # Left to itself zarr skips chunks full of the fill value: no telling them from lost ones.
+    array: zarr.Array[Any] = found.with_config({"write_empty_chunks": True})
+    return array
+
+
+def _nodes(path: Path, pattern: str) -> dict[str, dict[str, Any]]:
+    """Return the metadata of the groups and arrays that match, by their path in the store."""
+    files = path.glob(f"{pattern}/{METADATA}")
+    return {file.parent.relative_to(path).as_posix(): _node(file) for file in files}
+
+
+def _node(file: Path) -> dict[str, Any]:
+    node: dict[str, Any] = json.loads(file.read_bytes())
+    if node["node_type"] == "group":
+        node["consolidated_metadata"] = _consolidated({})
+    return node
+
+
+def _write_root(path: Path, attributes: Mapping[str, Any], nodes: Mapping[str, Any]) -> None:
+    """Replace the root metadata in one step.
+
+    They are what `zarr.consolidate_metadata` makes, which would look into `runs` and `claims` too:
+    these are no part of the Zarr hierarchy. A checksummed copy is written first, from which a
+    damaged root is restored.
+    """
+    root = {
+        "attributes": dict(attributes),
+        "zarr_format": 3,
+        "consolidated_metadata": _consolidated(dict(sorted(nodes.items()))),
+        "node_type": "group",
+    }
+    data = json.dumps(root, indent=1).encode()
+    write_atomically(path / METADATA_COPY, seal(data))
+    write_atomically(path / METADATA, data)
+
+
+def _consolidated(nodes: Mapping[str, Any]) -> dict[str, Any]:
+    return {"kind": "inline", "must_understand": False, "metadata": nodes}

@@ -1,0 +1,263 @@
+"""The science of one block: points in, arrays out. A pure function, without Dask and Zarr.
+
+The arrays of a point depend on the point and on the code, not on its neighbours in the block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.features import (
+    FEATURES,
+    FourierFeatures,
+    fourier_features,
+    local_sigma,
+    order_parameter,
+    range_of,
+    sigma,
+)
+from chimera_hpc.features.series import quantise
+from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.integrate.driver import Control, Outcome, Stopped, integrate
+from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.layout import MISSING, SCALE, sample_times, scalar_labels, series_mask
+from chimera_hpc.models import Model, build, initial_state
+from chimera_hpc.reduce.variation import total_variations
+from chimera_hpc.status import Status
+
+Array = NDArray[np.float64]
+
+_RETRIED = (Status.NON_FINITE, Status.STEP_TOO_SMALL)
+
+
+@dataclass(frozen=True)
+class BlockResult:
+    """What a block of n points leaves behind; rows in the order of the points.
+
+    A point that was not reached (the caller stopped) has status NEVER and is not written.
+
+    Attributes
+    ----------
+    status : shape (n,)
+        `Status` of each point.
+    features : shape (n, 8, N0)
+        Along axis 1 `features.FEATURES`; NaN unless the point is DONE.
+    scalars : shape (n, n_scalars)
+        Along axis 1 `layout.scalar_labels`.
+    steps, elapsed_us, n_windows : shape (n,)
+        Accepted steps, share of the wall time in microseconds, Fourier windows.
+    series : shape (n, T, N0) or None
+        u on the analysis interval as it is stored; None when the sweep keeps none.
+    """
+
+    status: NDArray[np.int64]
+    features: Array
+    scalars: Array
+    steps: NDArray[np.int64]
+    elapsed_us: NDArray[np.int64]
+    n_windows: NDArray[np.int64]
+    series: NDArray[Any] | None
+
+
+def run_block(
+    sweep: Sweep,
+    points: Points,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+    on_point: Callable[[int, Status], None] | None = None,
+    lanes: int | None = None,
+) -> BlockResult:
+    """Integrate the points and measure their series.
+
+    A run that becomes non-finite, or whose steps become too small, is tried again with both
+    tolerances multiplied by ``run.tighten``, up to ``run.attempts`` tries in all.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    points : Points
+        Any points of the sweep.
+    should_stop : callable, optional
+        Asked about ten times a second; when true, the result is returned as far as it has come.
+    on_point : callable, optional
+        Called with (index, status) as each point ends.
+    lanes : int, optional
+        Lanes of the stepping loop; chosen from the work by default.
+    """
+    block = _Block(sweep, points)
+    with suppress(Stopped):
+        for rows in _lane_groups(block.models):
+            factor = 1.0
+            for _ in range(sweep.run.attempts):
+                block.integrate(rows, factor, should_stop, on_point, lanes)
+                rows = [row for row in rows if block.result.status[row] in _RETRIED]
+                factor *= sweep.run.tighten
+    return block.result
+
+
+def failed_block(sweep: Sweep, points: Points, status: Status) -> BlockResult:
+    """Return the result of points that could not be computed at all, for the reason ``status``."""
+    result = _empty_result(sweep, len(points))
+    result.status[:] = status
+    return result
+
+
+def _empty_result(sweep: Sweep, n: int) -> BlockResult:
+    series = None
+    if sweep.keep.series != "none":
+        missing = MISSING if sweep.keep.dtype == "int16" else np.nan
+        shape = (n, sweep.n_samples, sweep.n_nodes)
+        series = np.full(shape, missing, dtype=sweep.keep.dtype)
+    return BlockResult(
+        np.full(n, int(Status.NEVER), dtype=np.int64),
+        np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
+        np.full((n, len(scalar_labels(sweep.features.groups))), np.nan),
+        *(np.zeros(n, dtype=np.int64) for _ in range(3)),
+        series,
+    )
+
+
+def _lane_groups(models: list[Model]) -> Iterator[list[int]]:
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for row, model in enumerate(models):
+        groups.setdefault(model.lane_group, []).append(row)
+    yield from groups.values()
+
+
+class _Block:
+    """Models, initial states and the result that the runs fill."""
+
+    def __init__(self, sweep: Sweep, points: Points) -> None:
+        n, times = len(points), sample_times(sweep)
+        self.sweep, self.times = sweep, times
+        rows = [points.row(i) for i in range(n)]
+        self.models = [build(sweep, row) for row in rows]
+        self.initial = [
+            initial_state(sweep, row, model)
+            for row, model in zip(rows, self.models, strict=True)
+        ]
+        self.keeps = series_mask(sweep, points.columns["seed"])
+        self.result = _empty_result(sweep, n)
+
+    def integrate(
+        self,
+        rows: list[int],
+        factor: float,
+        should_stop: Callable[[], bool] | None,
+        on_point: Callable[[int, Status], None] | None,
+        lanes: int | None,
+    ) -> None:
+        if not rows:
+            return
+        spec = self.sweep.integrator
+        control = Control(
+            t_end=spec.t_end,
+            start=float(self.times[0]),
+            step=spec.t_step,
+            rtol=spec.rtol * factor,
+            atol=spec.atol * factor,
+            method=spec.method,
+            max_steps=spec.max_steps,
+            time_out=spec.time_out,
+        )
+        models = [self.models[row] for row in rows]
+
+        def on_end(number: int, outcome: Outcome) -> None:
+            self.measure(rows[number], outcome)
+            if on_point is not None:
+                on_point(rows[number], Status(self.result.status[rows[number]]))
+
+        def state(number: int) -> Array:
+            return models[number].state(*self.initial[rows[number]])
+
+        n_rows = max(model.n_rows for model in models)
+        integrate(models, state, control, n_rows, on_end, should_stop, lanes)
+
+    def measure(self, row: int, outcome: Outcome) -> None:
+        result, model = self.result, self.models[row]
+        result.steps[row] += outcome.steps
+        result.elapsed_us[row] += int(1e6 * outcome.elapsed)
+        result.status[row] = outcome.status
+        if outcome.status is not Status.DONE:
+            return
+        u, w = model.node_pair(outcome.samples)
+        features = self.features(u)
+        result.status[row] = features.status
+        result.n_windows[row] = features.n_windows
+        result.features[row] = features.as_array()
+        result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
+        if result.series is not None and self.keeps[row]:
+            self.keep(u, result.series[row])
+
+    def keep(self, u: Array, out: NDArray[Any]) -> None:
+        if self.sweep.keep.dtype == "int16":
+            quantise(u, SCALE, MISSING, out)
+        else:
+            out[:] = u.T
+
+    def features(self, u: Array) -> FourierFeatures:
+        spec = self.sweep.features
+        return fourier_features(
+            self.times,
+            u.T,
+            n_peaks=spec.n_peaks,
+            n_share=spec.n_share,
+            clock=spec.clock,
+            clock_node=spec.clock_node,
+            phase_mean=spec.phase_mean,
+            refine=spec.refine,
+            time_origin=spec.time_origin,
+            still=spec.still,
+        )
+
+    def scalars(
+        self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
+    ) -> Array:
+        return np.array(
+            [
+                *total_variations(features),
+                *(sigma(u), sigma(w)),
+                *(float(u.std(axis=0).mean()), range_of(u)),
+                *(order_parameter(u, w), self.distance(row, y_end)),
+                *local_sigma(u, self.sweep.features.groups),
+            ]
+        )
+
+    def distance(self, row: int, y_end: Array) -> float:
+        """Distance of the last state (u, v) from the centre of the ball of initial states.
+
+        In the norm of the ball (paper fig:stability).
+        """
+        model, spec = self.models[row], self.sweep.integrator
+        u, v = model.equilibrium(spec.centre)
+        t_end = np.array([spec.t_end])
+        second = model.second_variable(y_end[:, None], self.initial[row][1], t_end)[0]
+        offset = np.concatenate([y_end[: model.n_nodes] - u, second - v])
+        if spec.ball == "maximum":
+            return float(np.abs(offset).max())
+        return float(np.sqrt(np.sum(offset * offset)))
+
+
+def warm_up(sweep: Sweep, points: Points) -> None:
+    """Compile every kernel that the sweep's points need, or read it from the disk.
+
+    Called once before workers start, so that they find everything compiled.
+    """
+    model = build(sweep, points.row(0))
+    state = model.state(*initial_state(sweep, points.row(0), model))
+    control = Control(t_end=0.02, start=0.0, step=0.01, method=sweep.integrator.method)
+    for lanes in (1, LANES):
+        integrate([model], [state], control, model.n_rows, lambda *_: None, lanes=lanes)
+    t = 0.01 * np.arange(2000.0)
+    rows = np.sin(2.0 * np.pi * t + np.arange(3.0)[:, None])
+    spec = sweep.features
+    fourier_features(t, rows.T, clock=spec.clock, refine=spec.refine)
+    order_parameter(rows.T, rows.T)
+    local_sigma(rows.T, 1)
+    quantise(rows, SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))

@@ -1,0 +1,70 @@
+"""Options, markers and fixtures that every test file may use."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import settings
+
+if TYPE_CHECKING:
+    from distributed import LocalCluster
+
+# Set before numpy is imported: one thread a process, as in the workers, and no display.
+for _name in ("OMP", "MKL", "OPENBLAS", "NUMBA"):
+    os.environ[f"{_name}_NUM_THREADS"] = "1"
+os.environ["MPLBACKEND"] = "Agg"
+
+# A shared machine makes deadlines lie; in CI the same examples are tried every time.
+settings.register_profile("local", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+SLURM_PROGRAMS = ("slurmctld", "slurmd", "sbatch", "munged")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--run-slow", action="store_true", help="run the tests marked slow too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not config.getoption("--run-slow"):
+        _skip(items, "slow", "slow: runs with --run-slow")
+    missing = _missing_slurm_programs()
+    if missing and os.environ.get("REQUIRE_SLURM") != "1":
+        _skip(items, "slurm", f"no SLURM on this machine: {', '.join(missing)} not found")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("slurm") and (missing := _missing_slurm_programs()):
+        pytest.fail(f"REQUIRE_SLURM=1, but {', '.join(missing)} not found", pytrace=False)
+
+
+def _skip(items: list[pytest.Item], marker: str, reason: str) -> None:
+    for item in items:
+        if item.get_closest_marker(marker):
+            item.add_marker(pytest.mark.skip(reason=reason))
+
+
+def _missing_slurm_programs() -> list[str]:
+    path = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/sbin"))
+    return [name for name in SLURM_PROGRAMS if shutil.which(name, path=path) is None]
+
+
+@pytest.fixture(scope="module")
+def local_cluster() -> Iterator[LocalCluster]:
+    """Two worker processes with one thread each, on loopback, without a dashboard."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address=None,
+        memory_limit=0,
+    ) as cluster:
+        yield cluster

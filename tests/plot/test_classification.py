@@ -1,0 +1,163 @@
+"""Dendrograms, projections, modal classes and the figures made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from chimera_hpc.plot import style
+from chimera_hpc.plot.classification import (
+    ClassifiedRuns,
+    classification_against,
+    classification_map,
+)
+from chimera_hpc.plot.dendrogram import brackets, dendrogram
+from chimera_hpc.plot.modes import class_against, class_map
+from chimera_hpc.plot.projections import projections
+
+Render = Callable[[Figure], Figure]
+
+# Leaves 0, 1 merge at 1, leaves 2, 3 at 2, all at 5.
+LINKAGE = np.array([[0, 1, 1.0, 2], [2, 3, 2.0, 2], [4, 5, 5.0, 4]])
+LEAVES = np.array([0, 0, 1, 1])
+NAMES = ("ordered", "chimera")
+TRIPLETS = np.array([[0.1, 0.01, 0.0], [0.1, 0.02, 0.0], [0.3, 0.1, 0.2], [0.3, 0.1, 0.21]])
+
+
+def rgb(name: str) -> tuple[float, ...]:
+    return tuple(np.round(to_rgb(style.colour_of(name)), 6))
+
+
+def test_brackets_by_hand() -> None:
+    corners, label = brackets(LINKAGE, LEAVES)
+    assert label.tolist() == [0, 1, -1]
+    np.testing.assert_array_equal(corners[0], [[0, 0], [0, 1], [1, 1], [1, 0]])
+    np.testing.assert_array_equal(corners[1], [[2, 0], [2, 2], [3, 2], [3, 0]])
+    np.testing.assert_array_equal(corners[2], [[0.5, 1], [0.5, 5], [2.5, 5], [2.5, 2]])
+
+
+def test_leaves_are_placed_without_crossings() -> None:
+    linkage = np.array([[0, 2, 1.0, 2], [1, 3, 2.0, 2], [4, 5, 5.0, 4]])
+    corners, _ = brackets(linkage, LEAVES)
+    assert corners[0][:, 0].max() < corners[1][:, 0].min()
+
+
+def test_dendrogram_colours_merges_by_class_and_draws_the_cut(rendered: Render) -> None:
+    figure = rendered(dendrogram(LINKAGE, LEAVES, NAMES, 3.5))
+    axes = figure.axes[0]
+    by_label = {lines.get_label(): lines for lines in axes.collections}
+    for name in NAMES:
+        lines = by_label[name]
+        assert len(lines.get_segments()) == 1
+        assert tuple(np.round(lines.get_colors()[0][:3], 6)) == rgb(name)
+    assert len(by_label["above the cut"].get_segments()) == 1
+    (cut,) = axes.lines
+    assert set(cut.get_ydata()) == {3.5}
+    assert [text.get_text() for text in axes.texts] == ["$d$ = 3.5"]
+    assert axes.get_ylim()[1] > 5.0
+    assert axes.get_xlabel() == "4 runs"
+
+
+def test_dendrogram_of_one_run_and_of_none(rendered: Render) -> None:
+    for n, names in ((1, ("ordered",)), (0, ())):
+        leaves = np.zeros(n, dtype=np.int64)
+        figure = rendered(dendrogram(np.empty((0, 4)), leaves, names, 0.0))
+        assert sum(len(lines.get_segments()) for lines in figure.axes[0].collections) == 0
+
+
+def test_projections_show_three_planes_and_a_solid(rendered: Render) -> None:
+    figure = rendered(projections(TRIPLETS, [0, 0, 1, -1], NAMES))
+    flat, solid = figure.axes[:3], figure.axes[3]
+    pairs = [(axes.get_xlabel()[:5], axes.get_ylabel()[:5]) for axes in flat]
+    theta, a, omega = r"$V_\theta$"[:5], "$V_a$", r"$V_\Omega$"[:5]
+    assert pairs == [(theta, a), (theta, omega), (a, omega)]
+    assert solid.name == "3d"
+    for axes, (x, y) in zip(flat, ((0, 1), (0, 2), (1, 2)), strict=True):
+        ordered, chimera = axes.collections
+        np.testing.assert_allclose(ordered.get_offsets(), TRIPLETS[:2][:, [x, y]])
+        np.testing.assert_allclose(chimera.get_offsets(), TRIPLETS[2:3][:, [x, y]])
+        assert tuple(np.round(ordered.get_facecolors()[0][:3], 6)) == rgb("ordered")
+        assert tuple(np.round(chimera.get_facecolors()[0][:3], 6)) == rgb("chimera")
+    assert sum(len(c.get_offsets()) for c in solid.collections) == 3
+
+
+def test_class_against_puts_each_class_in_its_row(rendered: Render, colour_at: Any) -> None:
+    classes = ["steady", "ordered", "disordered", None, "chimera"]
+    figure = rendered(class_against([2, 3, 4, 5, 6], classes, label="$P = Q$"))
+    axes = figure.axes[0]
+    rows = [text.get_text() for text in axes.get_yticklabels()]
+    assert rows == ["steady", "ordered", "chimera", "disordered"]
+    assert axes.get_xlabel() == "$P = Q$"
+    for x, name in zip([2, 3, 4, 6], ["steady", "ordered", "disordered", "chimera"], strict=True):
+        assert colour_at(axes, x, rows.index(name)) == [rgb(name)]
+    assert not any(colour_at(axes, 5, row) for row in range(4))
+
+
+def test_votes_are_discs_with_area_by_share() -> None:
+    votes = [{"ordered": 15, "chimera": 5}, {"chimera": 20}]
+    axes = class_against([1, 2], ["ordered", "chimera"], votes).axes[0]
+    discs = {
+        tuple(c.get_offsets()[0]): float(c.get_sizes()[0])
+        for c in axes.collections
+        if c.get_zorder() == 1.0
+    }
+    full = discs[(2.0, 1.0)]
+    assert discs == pytest.approx(
+        {(1.0, 0.0): 0.75 * full, (1.0, 1.0): 0.25 * full, (2.0, 1.0): full}
+    )
+
+
+def test_class_map_colours_every_cell(rendered: Render, colour_at: Any) -> None:
+    p, q = [3, 3, 4, 4, 5], [0, 3, 0, 4, 2]
+    classes = ["steady", "ordered", "chimera", "disordered-2", None]
+    figure = rendered(class_map(p, q, classes))
+    axes = figure.axes[0]
+    for x, y, name in list(zip(p, q, classes, strict=True))[:4]:
+        assert colour_at(axes, x, y) == [rgb(name)]
+    assert colour_at(axes, 5, 2) == []
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$P$", "$Q$")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["ordered", "chimera", "disordered-2", "steady"]
+
+
+@pytest.fixture
+def runs() -> ClassifiedRuns:
+    return ClassifiedRuns(LINKAGE, LEAVES, NAMES, 3.5, TRIPLETS, np.array([0, 0, 1, 1]))
+
+
+def test_classification_joins_tree_plane_and_classes(
+    rendered: Render, runs: ClassifiedRuns, colour_at: Any
+) -> None:
+    figure = rendered(classification_against(runs, [6, 7, 8], ["ordered", "chimera", "steady"]))
+    tree, plane, modal = figure.axes
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["(a)", "(b)", "(c)"]
+    assert set(tree.lines[0].get_ydata()) == {3.5}
+    assert (plane.get_xlabel(), plane.get_ylabel()) == (r"$V_\theta$", "$V_a$")
+    assert colour_at(modal, 7, 2) == [rgb("chimera")]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["ordered", "chimera", "steady"]
+
+
+def test_five_classes_are_five_colours(rendered: Render) -> None:
+    names = ("ordered-1", "ordered-2", "chimera", "disordered-1", "disordered-2")
+    rng = np.random.default_rng(0)
+    triplets, labels = rng.random((10, 3)), np.repeat(np.arange(5), 2)
+    runs = ClassifiedRuns(LINKAGE, LEAVES, names, 3.5, triplets, labels)
+    figure = rendered(classification_against(runs, range(5), names))
+    plane = figure.axes[1]
+    colours = [tuple(np.round(c.get_facecolors()[0][:3], 6)) for c in plane.collections]
+    assert colours == [rgb(name) for name in names]
+    assert len(set(colours)) == 5
+
+
+def test_classification_map_has_the_plane_as_third_panel(
+    rendered: Render, runs: ClassifiedRuns, colour_at: Any
+) -> None:
+    figure = rendered(classification_map(runs, [3, 3], [0, 1], ["steady", "chimera"]))
+    assert colour_at(figure.axes[2], 3, 1) == [rgb("chimera")]
+    assert figure.axes[2].get_ylabel() == "$Q$"

@@ -1,0 +1,286 @@
+"""What the package promises as a whole: light, one-way imports, strict kernels, clean files."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+import chimera_hpc
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "chimera_hpc"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+# A module imports from its own line or from lines above; the same list stands in DESIGN.md.
+LAYERS = (
+    "errors",
+    "status",
+    "processes",
+    "files",
+    "topology",
+    "streams",
+    "grid",
+    "integrate",
+    "models",
+    "features",
+    "reduce.variation",
+    "simulate",
+    "task",
+    "claims",
+    "ledger",
+    "layout",
+    "provenance",
+    "store",
+    "reduce",
+    "plot",
+    "report",
+    "execute",
+    "cluster",
+    "sweep",
+)
+PRINTING = {"report.py", "sweep.py"}
+
+
+def modules_loaded_by(statement: str) -> set[str]:
+    """Top-level names in sys.modules after the statement, in a process of its own."""
+    code = f"{statement}\nimport sys\nprint(*{{name.partition('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    return set(done.stdout.split())
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    heavy = {"numba", "numpy", "scipy", "zarr", "dask", "distributed", "sklearn", "matplotlib"}
+    assert modules_loaded_by("import chimera_hpc") & heavy == set()
+
+
+def test_task_knows_neither_dask_nor_zarr():
+    doors = {"dask", "distributed", "zarr"}
+    assert modules_loaded_by("import chimera_hpc.task") & doors == set()
+
+
+def test_ledger_knows_no_zarr():
+    assert "zarr" not in modules_loaded_by("import chimera_hpc.ledger")
+
+
+@pytest.mark.parametrize("name", chimera_hpc.__all__)
+def test_every_public_name_can_be_imported(name):
+    assert getattr(chimera_hpc, name) is not None
+    assert name in dir(chimera_hpc)
+
+
+def test_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="has no attribute 'nothing_like_this'"):
+        _ = chimera_hpc.nothing_like_this
+
+
+def test_simulate_stays_the_function_after_its_module_was_imported():
+    code = (
+        "import chimera_hpc.simulate\n"
+        "from chimera_hpc import simulate\n"
+        "assert callable(simulate), simulate"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def module_name(source: Path) -> str:
+    """Dotted name below chimera_hpc; empty for the package itself."""
+    parts = source.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def layer(name: str) -> int:
+    """Position in LAYERS of the longest entry that the module is or lies in."""
+    inside = [entry for entry in LAYERS if f"{name}.".startswith(f"{entry}.")]
+    assert inside, f"chimera_hpc.{name} has no place in LAYERS yet"
+    return LAYERS.index(max(inside, key=len))
+
+
+def imported_modules(source: Path) -> Iterator[str]:
+    """Dotted names below chimera_hpc that a file imports, wherever in the file."""
+    here = ["chimera_hpc", *filter(None, module_name(source).split("."))]
+    if source.name != "__init__.py":
+        here.pop()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = here[: len(here) + 1 - node.level] if node.level else []
+            base = [*base, *filter(None, [node.module])]
+            names = [is_module_or_parent([*base, alias.name]) for alias in node.names]
+        for name in names:
+            if name.startswith("chimera_hpc."):
+                yield name.removeprefix("chimera_hpc.")
+
+
+def is_module_or_parent(parts: list[str]) -> str:
+    """`from a import b` imports the module a.b if there is one, otherwise something inside a."""
+    path = ROOT.joinpath(*parts)
+    found = path.is_dir() or path.with_suffix(".py").is_file()
+    return ".".join(parts if found else parts[:-1])
+
+
+def test_design_lists_the_layers():
+    table = re.findall(
+        r"^\| (`.*?) \|", (ROOT / "DESIGN.md").read_text("utf-8"), flags=re.MULTILINE
+    )
+    assert tuple(re.findall(r"`([\w.]+)`", " ".join(table))) == LAYERS
+
+
+@pytest.mark.parametrize(
+    "source", [s for s in SOURCES if module_name(s)], ids=lambda s: module_name(s)
+)
+def test_imports_go_one_way(source):
+    own = layer(module_name(source))
+    upward = [name for name in imported_modules(source) if layer(name) > own]
+    assert upward == []
+
+
+def test_zarr_and_clusters_have_one_door_each():
+    doors = {"zarr": "store", "dask_jobqueue": "cluster"}
+    for source in SOURCES:
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names = [node.module]
+            for name in names:
+                door = doors.get(name.partition(".")[0])
+                assert door in {None, module_name(source).partition(".")[0]}, f"{source}: {name}"
+
+
+def test_no_kernel_states_fastmath():
+    stated = [
+        f"{source.relative_to(ROOT)}:{getattr(node, 'lineno', '?')}"
+        for source in SOURCES
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        if (isinstance(node, ast.keyword) and node.arg == "fastmath")
+        or (isinstance(node, ast.Constant) and node.value == "fastmath")
+    ]
+    assert stated == []
+
+
+def test_only_the_command_line_prints():
+    printing = [
+        f"{source.relative_to(ROOT)}:{node.lineno}"
+        for source in SOURCES
+        if source.relative_to(PACKAGE).as_posix() not in PRINTING
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "print"
+    ]
+    assert printing == []
+
+
+def project_files() -> list[Path]:
+    """Files that git tracks or would add."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=True,
+    ).stdout
+    files = [ROOT / name for name in listed.split("\0") if name]
+    assert files
+    return [file for file in files if file.is_file()]
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a git checkout")
+def test_no_file_names_a_registry_or_a_home_folder():
+    # In pieces, so that this file does not find itself.
+    hosts = [
+        "py" + r"pi\.org",
+        "python" + r"hosted\.org",
+        "registry" + r"\.npmjs",
+        "deb" + r"ian\.org",
+    ]
+    folders = ["/ro" + "ot/", "/ho" + r"me/\w", "/Us" + r"ers/\w", "/wo" + "rk/"]
+    pattern = re.compile("|".join(hosts + folders).encode())
+    found = [
+        f"{file.relative_to(ROOT)}: {match.group().decode()}"
+        for file in project_files()
+        if (match := pattern.search(file.read_bytes()))
+    ]
+    assert found == []
+
+
+def locked(name: str) -> tuple[dict[str, list[Requirement]], str]:
+    """Requirements of a lock file by canonical name, and its text."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    entries: dict[str, list[Requirement]] = {}
+    for line in re.findall(r"^[a-zA-Z].*(?= \\$)", text, flags=re.MULTILINE):
+        requirement = Requirement(line)
+        entries.setdefault(canonicalize_name(requirement.name), []).append(requirement)
+    return entries, text
+
+
+def declared(*extras: str) -> list[Requirement]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    optional = [line for extra in extras for line in project["optional-dependencies"][extra]]
+    return [Requirement(line) for line in project["dependencies"] + optional]
+
+
+@pytest.mark.parametrize(
+    ("name", "extras"),
+    [("requirements.lock", ("slurm", "dev")), ("requirements-bench.lock", ("bench",))],
+)
+def test_lock_file_pins_what_pyproject_declares(name, extras):
+    entries, text = locked(name)
+    for requirement in declared(*extras):
+        pins = entries[canonicalize_name(requirement.name)]
+        versions = [next(iter(pin.specifier)).version for pin in pins]
+        assert all(requirement.specifier.contains(version) for version in versions), requirement
+    assert not re.search(r"://|^\s*--(?!hash=sha256:[0-9a-f]{64})", text, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", ["requirements.lock", "requirements-bench.lock"])
+def test_every_pin_has_a_hash(name):
+    _, text = locked(name)
+    pins = re.findall(r"^([a-zA-Z][^\n]*)((?:\n +--hash=\S+(?: \\)?)*)", text, flags=re.MULTILINE)
+    assert [pin for pin, hashes in pins if not hashes] == []
+
+
+def test_both_lock_files_agree():
+    base, bench = locked("requirements.lock")[0], locked("requirements-bench.lock")[0]
+    different = {
+        name
+        for name in base.keys() & bench.keys()
+        if set(map(str, base[name])) != set(map(str, bench[name]))
+    }
+    assert different == set()
+
+
+def test_version_is_the_same_everywhere():
+    version = chimera_hpc.__version__
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_wheel_carries_jobs_and_type_marker(tmp_path):
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    jobs = {
+        f"chimera_hpc/{path.relative_to(ROOT).as_posix()}" for path in ROOT.glob("jobs/**/*.toml")
+    }
+    assert jobs
+    assert names >= jobs | {"chimera_hpc/py.typed"}
+    assert {name.partition("/")[0].partition("-")[0] for name in names} == {"chimera_hpc"}
