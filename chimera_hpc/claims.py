@@ -38,6 +38,8 @@ from chimera_hpc.processes import is_gone, process_mark
 FOLDER = "claims"
 EXPIRY = 60.0
 """Seconds without a heartbeat after which a claim is free; kernels return to Python every 0.5 s."""
+_HANDED_BACK, _OUT_OF_MEMORY = 0, 1
+"""Heartbeats, long expired, by which an owner's last word reaches the next one."""
 _NAME = re.compile(r"(?P<block>\w+)\.(?P<attempt>[1-9]\d*)\.json", re.ASCII)
 
 
@@ -53,6 +55,8 @@ class LostAttempt:
     """Which attempt it was, from 1."""
     handed_back: bool
     """Whether its owner lived to say that it gave up; else the process was lost."""
+    out_of_memory: bool
+    """Whether its owner could still say that it was ended for its use of memory."""
     info: Mapping[str, Any]
     """The contents of the claim file; empty when unreadable."""
 
@@ -101,7 +105,12 @@ class Claim:
     def hand_back(self) -> None:
         """Let others take the block at once; the attempt stays counted."""
         if self.still_mine():
-            os.utime(self.path, (0, 0))
+            os.utime(self.path, (_HANDED_BACK, _HANDED_BACK))
+
+    def blame_memory(self) -> None:
+        """Leave word that this process is being ended because it uses too much memory."""
+        with contextlib.suppress(OSError):
+            os.utime(self.path, (_OUT_OF_MEMORY, _OUT_OF_MEMORY))
 
 
 def claim_block(
@@ -163,6 +172,14 @@ def remove_stale(store: Path, blocks: Collection[int]) -> int:
     return len(stale)
 
 
+def forget_points(store: Path, block: int) -> None:
+    """Delete the claims ``<block>_<row>`` on single points of a block that is finished."""
+    folder = Path(store) / FOLDER
+    for match in map(_NAME.fullmatch, _names(folder)):
+        if match and match["block"].startswith(f"{block}_"):
+            (folder / match[0]).unlink(missing_ok=True)
+
+
 def _highest(folder: Path) -> list[tuple[int, Path, bool]]:
     """Return the claimed blocks, the file of the highest attempt, and whether that is free."""
     highest: dict[int, int] = {}
@@ -212,10 +229,10 @@ def _is_free(path: Path, now: float) -> bool:
 def _lost(folder: Path, block: int | str, attempt: int) -> LostAttempt:
     path = _path(folder, block, attempt)
     try:
-        handed_back = path.stat().st_mtime == 0
+        word = path.stat().st_mtime
     except FileNotFoundError:
-        handed_back = False
-    return LostAttempt(attempt, handed_back, _read(path))
+        word = -1.0
+    return LostAttempt(attempt, word == _HANDED_BACK, word == _OUT_OF_MEMORY, _read(path))
 
 
 def _read(path: Path) -> dict[str, Any]:

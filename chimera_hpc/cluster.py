@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.errors import BadInput
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 LOOPBACK = "127.0.0.1"
 
@@ -28,19 +30,26 @@ ONE_THREAD = {
 }
 """Environment of a worker process: it computes with one thread, whatever library it calls."""
 
-SETTINGS: dict[str, Any] = {
-    # The claims in the store count the deaths of workers and find the culprit; Dask must not give
-    # up on a block that merely stood in the queue of a worker that died.
-    "distributed.scheduler.allowed-failures": 1000,
-    # A worker that hangs (stopped, or its node gone) is given up after this time.
-    "distributed.scheduler.worker-ttl": "60s",
-    # A block belongs to the worker that claimed it.
-    "distributed.scheduler.work-stealing": False,
-    "distributed.nanny.pre-spawn-environ": ONE_THREAD,
-    "distributed.worker.preload": ["chimera_hpc.worker"],
-    "distributed.admin.tick.limit": "1h",
-    "distributed.logging": {"distributed": "error", "tornado": "critical", "bokeh": "error"},
-}
+
+def settings(patience: float = 60.0) -> dict[str, Any]:
+    """Return how Dask is set up: `patience` is the time after which a silent worker is given up."""
+    return {
+        # The claims in the store count the deaths of workers and find the culprit; Dask must not
+        # give up on a block that merely stood in the queue of a worker that died.
+        "distributed.scheduler.allowed-failures": 1_000_000,
+        # A worker that hangs (stopped, or its node gone) is given up after this time.
+        "distributed.scheduler.worker-ttl": f"{patience}s",
+        # A block belongs to the worker that claimed it.
+        "distributed.scheduler.work-stealing": False,
+        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
+        # A worker near its limit must neither stand still with its blocks nor move its few bytes to
+        # a disk: it works on, or is ended and leaves word (see `worker`).
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.worker.memory.pause": False,
+        "distributed.worker.memory.terminate": 0.95,
+        "distributed.admin.tick.limit": "1h",
+    }
 
 
 def usable_cores() -> int:
@@ -52,7 +61,11 @@ def usable_cores() -> int:
 
 @contextmanager
 def local_cluster(
-    workers: int, scratch: Path | None = None, memory_limit: str | None = "auto"
+    workers: int,
+    *,
+    patience: float = 60.0,
+    scratch: Path | None = None,
+    memory_limit: str | None = "auto",
 ) -> Iterator[Client]:
     """Start one-thread worker processes on this machine and give a client of them.
 
@@ -62,16 +75,18 @@ def local_cluster(
     ----------
     workers : int
         Number of worker processes; 0 means one a core.
+    patience : float
+        Seconds after which a worker that gives no sign of life is replaced.
     scratch : Path, optional
         Folder for the workers' own files; a temporary one by default.
     memory_limit : str, optional
-        Memory at which a worker is restarted; a share of the machine's by default.
+        Memory at which a worker is ended and replaced; a share of the machine's by default.
     """
     import dask
     from distributed import Client, LocalCluster
 
     with (
-        dask.config.set(SETTINGS),
+        dask.config.set(settings(patience)),
         LocalCluster(
             n_workers=workers or usable_cores(),
             threads_per_worker=1,
@@ -85,11 +100,16 @@ def local_cluster(
         ) as cluster,
         Client(cluster) as client,
     ):
-        yield client
+        _prepare(client)
+        try:
+            yield client
+        except KeyboardInterrupt:
+            _kill_workers(cluster)
+            raise
 
 
 @contextmanager
-def existing_cluster(scheduler_file: Path, patience: float = 60.0) -> Iterator[Client]:
+def existing_cluster(scheduler_file: Path, *, patience: float = 60.0) -> Iterator[Client]:
     """Connect to a scheduler that is running already, by the file it wrote.
 
     Raises
@@ -98,16 +118,45 @@ def existing_cluster(scheduler_file: Path, patience: float = 60.0) -> Iterator[C
         When the file is missing or the scheduler does not answer within ``patience`` seconds.
     """
     import dask
-    from distributed import Client
 
     if not scheduler_file.is_file():
-        raise BadInput(f"{scheduler_file}: no such scheduler file (dask scheduler --scheduler-file)")
-    with dask.config.set(SETTINGS):
+        raise BadInput(
+            f"{scheduler_file}: no such file; dask scheduler --scheduler-file makes it"
+        )
+    with dask.config.set(settings(patience)), _connected(scheduler_file, patience) as client:
+        _prepare(client)
+        yield client
+
+
+def _connected(scheduler_file: Path, patience: float) -> Client:
+    from distributed import Client
+
+    deadline = time.monotonic() + patience
+    while True:
+        # Each try reads the file anew: another scheduler may have been started meanwhile.
         try:
-            client = Client(
-                scheduler_file=str(scheduler_file), timeout=patience
-            )
+            return Client(scheduler_file=str(scheduler_file), timeout=min(patience, 5.0))
         except (OSError, TimeoutError, ValueError) as error:
-            raise BadInput(f"{scheduler_file}: its scheduler does not answer: {error}") from None
-        with client:
-            yield client
+            if time.monotonic() > deadline:
+                text = f"{scheduler_file}: its scheduler does not answer: {error}"
+                raise BadInput(text) from None
+            time.sleep(0.5)
+
+
+def _prepare(client: Client) -> None:
+    from chimera_hpc.worker import Manners
+
+    client.register_plugin(Manners())
+
+
+def _kill_workers(cluster: LocalCluster) -> None:
+    """End all workers at once: what they have in hand is given up."""
+    for nanny in cluster.workers.values():
+        nanny.auto_restart = False
+        if nanny.process is not None and nanny.process.pid:
+            _kill(nanny.process.pid)
+
+
+def _kill(pid: int) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGKILL)

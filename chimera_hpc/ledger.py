@@ -26,6 +26,8 @@ from chimera_hpc.status import Status
 FIELDS = ("status", "attempts", "steps", "elapsed_us", "n_windows", "run", "digest")
 FAILED = tuple(status for status in Status if status.is_failure)
 RESULTS = tuple(status for status in Status if status.is_result)
+NO_LIMIT = 2**62
+"""More attempts than there are ever, and a higher number than any run has."""
 SEPARATOR = "."
 """Between the parts of a chunk's name: the chunks of an array lie flat in its folder."""
 METADATA = "zarr.json"
@@ -143,13 +145,15 @@ def unfinished(
     columns: Mapping[str, NDArray[np.int64]],
     attempts: int = 0,
     statuses: Collection[Status] = FAILED,
+    before: int = NO_LIMIT,
 ) -> NDArray[np.bool_]:
     """Tell which points are to be run: never run, or failed fewer than `attempts` times.
 
-    `statuses` limits which failures are tried again.
+    `statuses` limits which failures are tried again, `before` to those of runs below this number.
     """
     status = columns["status"]
     again = np.isin(status, [int(code) for code in statuses]) & (columns["attempts"] < attempts)
+    again &= columns["run"] < before
     return np.asarray((status == Status.NEVER) | again)
 
 

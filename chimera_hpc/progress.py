@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -34,8 +35,14 @@ class Reporter:
         """Show the bar, on a terminal."""
         if self._stream.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-            from rich.progress import TimeElapsedColumn, TimeRemainingColumn
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Progress,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
 
             self._bar = Progress(
                 TextColumn("{task.description}"),
@@ -63,7 +70,8 @@ class Reporter:
             self._bar.stop()
             self._bar = None
         if self._log is not None:
-            self._log.close()
+            with suppress(OSError):
+                self._log.close()
             self._log = None
 
     def begin(self, done: int) -> None:
@@ -78,15 +86,18 @@ class Reporter:
         if self._bar is not None:
             self._bar.console.print(line, highlight=False, markup=False)
         else:
-            print(line, file=self._stream, flush=True)
+            # A full disk, or a reader that is gone, is no reason to stop computing.
+            with suppress(OSError):
+                print(line, file=self._stream, flush=True)
         self.note(line)
 
     def note(self, line: str) -> None:
         """Write a line into the log only."""
         if self._log is not None:
             stamp = datetime.now(UTC).isoformat(timespec="seconds")
-            self._log.write(f"{stamp} {line}\n")
-            self._log.flush()
+            with suppress(OSError):
+                self._log.write(f"{stamp} {line}\n")
+                self._log.flush()
 
     def add(self, n_done: int, n_failed: int) -> None:
         """Count the points of a block that has ended."""
@@ -95,7 +106,7 @@ class Reporter:
         elapsed = time.monotonic() - self._began
         rate = (self.done - self._at_start) / max(elapsed, 1e-9)
         if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=0, rate=f"{rate:.1f}/s")
+            self._bar.update(self._task, completed=self.done, rate=f"{rate:.1f}/s")
         elif time.monotonic() - self._last_line > LINE_SECONDS or self.done >= self.total:
             self._last_line = time.monotonic()
             left = (self.total - self.done) / max(rate, 1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from chimera_hpc.errors import BadInput
 from chimera_hpc.integrate import METHODS
 from chimera_hpc.integrate.driver import Control, Outcome, integrate
-from chimera_hpc.models import Model, NetworkedFHN, TopologicalFHN
+from chimera_hpc.models import Model
+from chimera_hpc.models.networked_fhn import NetworkedFHN
+from chimera_hpc.models.topological_fhn import TopologicalFHN
 from chimera_hpc.status import Status
 from chimera_hpc.topology import Topology
 
 Array = NDArray[np.float64]
+Form = Literal["reduced", "full"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,7 @@ def simulate(
     t_start: float = 0.0,
     rtol: float = 1e-3,
     atol: float = 1e-6,
-    form: Literal["reduced", "full"] = "reduced",
+    form: Form = "reduced",
     method: str = "tsit5",
     max_steps: int = 10_000_000,
     time_out: float = math.inf,
@@ -76,8 +79,8 @@ def simulate(
     Parameters
     ----------
     system : Topology, TopologicalFHN or NetworkedFHN
-        A topology stands for the topological FitzHugh-Nagumo model on it with ``epsilon``, ``b``, ``c``
-        and ``form``, which models with parameters of their own don't read.
+        A topology stands for the topological FitzHugh-Nagumo model on it with ``epsilon``, ``b``,
+        ``c`` and ``form``, which models with parameters of their own don't read.
     u0 : shape (N0,)
         Initial node signals.
     v0 : shape (N1,), for the networked model (N0,)
@@ -109,8 +112,12 @@ def simulate(
     (3, 8)
     """
     if isinstance(system, Topology):
-        if not epsilon > 0.0:
-            raise BadInput(f"epsilon = {epsilon}: must be above 0")
+        if not (epsilon > 0.0 and all(map(math.isfinite, (epsilon, b, c)))):
+            raise BadInput(
+                f"epsilon = {epsilon}, b = {b}, c = {c}: finite numbers and epsilon > 0 are needed"
+            )
+        if form not in get_args(Form):
+            raise BadInput(f"form = {form!r}: allowed are {', '.join(get_args(Form))}")
         model: Model = TopologicalFHN(system, epsilon, b, c, form)
     else:
         model = system

@@ -40,7 +40,8 @@ _SENTENCES = {
     Status.STEADY: "steady: the signal stands still, so it has no amplitude, phase or frequency",
     Status.NO_WINDOW: "no complete window: the analysis interval holds too few maxima",
     Status.NON_FINITE: "non-finite: the state grew beyond all bounds",
-    Status.STEP_TOO_SMALL: "step too small: the error control asked for a step below the resolution of time",
+    Status.STEP_TOO_SMALL: "step too small: the error control asked for a step below the "
+    "resolution of time",
     Status.STEP_BUDGET: "step budget: integrator.max_steps was used up before t_end",
     Status.TIME_OUT: "time-out: integrator.time_out seconds of wall time were used up",
     Status.WORKER_LOST: "worker lost: the process that computed it died every time",

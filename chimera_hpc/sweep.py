@@ -43,6 +43,7 @@ def parser() -> ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
     args = parser().parse_args(arguments)
+    args.typed = sys.argv[1:] if arguments is None else list(arguments)
     try:
         return int(args.execute(args))
     except BadInput as error:

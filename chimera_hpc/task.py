@@ -115,11 +115,13 @@ def _empty_result(sweep: Sweep, n: int) -> BlockResult:
         shape = (n, sweep.n_samples, sweep.n_nodes)
         series = np.full(shape, missing, dtype=sweep.keep.dtype)
     return BlockResult(
-        np.full(n, int(Status.NEVER), dtype=np.int64),
-        np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
-        np.full((n, len(scalar_labels(sweep.features.groups))), np.nan),
-        *(np.zeros(n, dtype=np.int64) for _ in range(3)),
-        series,
+        status=np.full(n, int(Status.NEVER), dtype=np.int64),
+        features=np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
+        scalars=np.full((n, len(scalar_labels(sweep.features.groups))), np.nan),
+        steps=np.zeros(n, dtype=np.int64),
+        elapsed_us=np.zeros(n, dtype=np.int64),
+        n_windows=np.zeros(n, dtype=np.int64),
+        series=series,
     )
 
 
@@ -139,8 +141,7 @@ class _Block:
         rows = [points.row(i) for i in range(n)]
         self.models = [build(sweep, row) for row in rows]
         self.initial = [
-            initial_state(sweep, row, model)
-            for row, model in zip(rows, self.models, strict=True)
+            initial_state(sweep, row, model) for row, model in zip(rows, self.models, strict=True)
         ]
         self.keeps = series_mask(sweep, points.columns["seed"])
         self.result = _empty_result(sweep, n)

@@ -22,8 +22,8 @@ class Topology:
     r"""A ring of N0 nodes, each linked to its P neighbours on either side, with oriented links.
 
     Link i P + (k - 1) joins node i and node i + k (mod N0), k = 1..P, counted from 0. Its two ends
-    are stored as (tail, head); reorienting a link swaps them in place. The incidence matrix has +1 at
-    the head and -1 at the tail of each link (paper eq. eq:B1initial).
+    are stored as (tail, head); reorienting a link swaps them in place. The incidence matrix has +1
+    at the head and -1 at the tail of each link (paper eq. eq:B1initial).
 
     Parameters
     ----------
@@ -52,7 +52,8 @@ class Topology:
         """
         if half_degree < 1 or 2 * half_degree >= n_nodes:
             raise BadInput(
-                f"P = {half_degree} on a ring of {n_nodes} nodes: 1 <= P and 2 P < n_nodes are needed"
+                f"P = {half_degree} on a ring of {n_nodes} nodes: "
+                "1 <= P and 2 P < n_nodes are needed"
             )
         if orientation not in (1, 2):
             raise BadInput(f"orientation = {orientation}: allowed are 1 and 2")
@@ -87,22 +88,39 @@ class Topology:
             raise BadInput(f"Q = {count}: allowed is 0 to P = {self.half_degree}")
         if not 0 <= node < self.n_nodes:
             raise BadInput(f"node = {node}: allowed is 0 to {self.n_nodes - 1}")
-        k = np.arange(1, count + 1)
+        return self.reorient(self.links_at(node, count))
+
+    def links_at(self, node: int = 0, reach: int | None = None) -> NDArray[np.int64]:
+        """Indices (2 reach,) of a node's links to its ``reach`` nearest neighbours on either side.
+
+        First those ahead, then those behind; all 2 P unless told.
+        """
+        k = np.arange(1, (self.half_degree if reach is None else reach) + 1)
         ahead = node * self.half_degree + k - 1
         behind = (node - k) % self.n_nodes * self.half_degree + k - 1
-        return self.reorient(np.concatenate([ahead, behind]))
+        return np.concatenate([ahead, behind])
 
-    def reorient_random(self, count: int, seed: int | np.random.Generator = 0) -> Topology:
+    def reorient_random(
+        self,
+        count: int,
+        seed: int | np.random.Generator = 0,
+        among: NDArray[np.int64] | None = None,
+    ) -> Topology:
         """Reverse ``count`` different links drawn uniformly (the paper's Q_r, sec:orient2).
+
+        They are drawn from all links, or from those with the indices ``among``.
 
         Raises
         ------
         BadInput
-            Unless 0 <= count <= N1.
+            Unless 0 <= count <= N1, or the number of ``among``.
         """
-        if not 0 <= count <= self.n_links:
-            raise BadInput(f"flips = {count}: allowed is 0 to the {self.n_links} links of the ring")
-        return self.reorient(np.random.default_rng(seed).choice(self.n_links, count, replace=False))
+        n_links = self.n_links if among is None else len(among)
+        if not 0 <= count <= n_links:
+            where = "of the ring" if among is None else "to draw from"
+            raise BadInput(f"flips = {count}: allowed is 0 to the {n_links} links {where}")
+        drawn = np.random.default_rng(seed).choice(n_links, count, replace=False)
+        return self.reorient(drawn if among is None else among[drawn])
 
     @cached_property
     def link_signs(self) -> Array:
@@ -123,7 +141,7 @@ class Topology:
 
     @cached_property
     def divergence(self) -> Array:
-        """Net divergence s = B1 1 of each node, shape (N0,): links that come in minus links that go out."""
+        """Net divergence s = B1 1 of each node, shape (N0,): links in minus links out."""
         arriving = np.bincount(self.links[:, 1], minlength=self.n_nodes)
         leaving = np.bincount(self.links[:, 0], minlength=self.n_nodes)
         return (arriving - leaving).astype(np.float64)
@@ -132,8 +150,8 @@ class Topology:
     def laplacian_eigenvalues(self) -> Array:
         r"""Eigenvalues of L0 = B1 B1^T, shape (N0,), in the order of the Fourier modes.
 
-        :math:`\Lambda_m = 2 \sum_{k=1}^{P} (1 - \cos(2 \pi m k / N_0))`: L0 is circulant and does not
-        depend on the orientation.
+        :math:`\Lambda_m = 2 \sum_{k=1}^{P} (1 - \cos(2 \pi m k / N_0))`: L0 is circulant and does
+        not depend on the orientation.
         """
         m = np.arange(self.n_nodes)[:, None]
         k = np.arange(1, self.half_degree + 1)[None, :]

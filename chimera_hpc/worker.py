@@ -1,17 +1,62 @@
-"""What every Dask worker process does before its first block (a Dask "preload")."""
+"""What every Dask worker process does before its first block (a Dask plugin)."""
 
 from __future__ import annotations
 
+import os
 import signal
-from typing import TYPE_CHECKING
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from distributed import WorkerPlugin
 
 if TYPE_CHECKING:
     from distributed import Worker
 
+_MEMORY = Path("/proc/self/statm")
+_NEARLY = 0.9
+"""Share of the memory limit from which an end is put down to the use of memory; Dask ends a
+worker at 0.95 of it."""
 
-def dask_setup(worker: Worker) -> None:
-    """Leave Ctrl-C to the driver: it stops the workers in good order.
 
-    A terminal sends SIGINT to all processes of the run at once.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class Manners(WorkerPlugin):
+    """How a worker process takes signals."""
+
+    name = "chimera_hpc"
+
+    def setup(self, worker: Worker) -> None:
+        """Leave Ctrl-C to the driver, and leave word when the memory was the end.
+
+        A terminal sends SIGINT to all processes of a run at once; the driver stops the workers in
+        good order. A nanny ends a worker that uses too much memory with SIGTERM: the next owner of
+        its block shall know.
+        """
+        limit = getattr(worker.memory_manager, "memory_limit", None)
+
+        def end(number: int, frame: FrameType | None) -> None:
+            if limit and resident_bytes() > _NEARLY * limit:
+                from chimera_hpc.work import blame_memory
+
+                blame_memory()
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+
+        _on(signal.SIGINT, signal.SIG_IGN)
+        _on(signal.SIGTERM, end)
+
+
+def resident_bytes() -> int:
+    """Return the memory that this process occupies, 0 where the system does not tell."""
+    try:
+        pages = int(_MEMORY.read_text().split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def _on(number: int, handler: Any) -> None:
+    try:
+        signal.signal(number, handler)
+    except ValueError:
+        # Not in the main thread: a worker inside somebody's program, whose signals are his.
+        return

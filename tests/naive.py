@@ -6,6 +6,7 @@ Nothing here is compiled, clever or fast; a test compares a kernel with its twin
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -221,3 +222,177 @@ def kernel_density(values, bandwidth, grid):
         z = (grid - x) / bandwidth
         density += np.exp(-0.5 * z**2) / (np.sqrt(2 * np.pi) * bandwidth * len(values))
     return density
+
+
+# --- topology and models --------------------------------------------------------------------------
+
+
+def ring_links(n, half, orientation=1):
+    """(tail, head) of every link, node by node and step by step."""
+    links = []
+    for i in range(n):
+        for k in range(1, half + 1):
+            ends = (i, (i + k) % n)
+            links.append(tuple(sorted(ends)) if orientation == 2 else ends)
+    return links
+
+
+def incidence(n, links):
+    """Dense incidence matrix: +1 at the head and -1 at the tail of each link."""
+    matrix = np.zeros((n, len(links)))
+    for column, (tail, head) in enumerate(links):
+        matrix[tail, column] -= 1.0
+        matrix[head, column] += 1.0
+    return matrix
+
+
+def full_rhs(y, links, n, epsilon, b, c):
+    """Right-hand side of the node-link equations, (n + n_links,)."""
+    matrix = incidence(n, links)
+    u, v = y[:n], y[n:]
+    return np.concatenate([(u - u**3 / 3 - matrix @ v) / epsilon, b + c * v + matrix.T @ u])
+
+
+def reduced_rhs(y, links, n, epsilon, b, c):
+    """Right-hand side of the node equations, (2 n,)."""
+    matrix = incidence(n, links)
+    u, w = y[:n], y[n:]
+    divergence, laplacian = matrix @ np.ones(len(links)), matrix @ matrix.T
+    return np.concatenate([(u - u**3 / 3 - w) / epsilon, b * divergence + c * w + laplacian @ u])
+
+
+def networked_rhs(state, n, half, sigma, epsilon, b, phi):
+    """Right-hand side of the classical ring, oscillator by oscillator, (2 n,)."""
+    x, y = state[:n], state[n:]
+    bxx, bxy, byx, byy = np.cos(phi), np.sin(phi), -np.sin(phi), np.cos(phi)
+    dx, dy = np.zeros(n), np.zeros(n)
+    for i in range(n):
+        pull_x = pull_y = 0.0
+        for j in range(i - half, i + half + 1):
+            pull_x += bxx * (x[j % n] - x[i]) + bxy * (y[j % n] - y[i])
+            pull_y += byx * (x[j % n] - x[i]) + byy * (y[j % n] - y[i])
+        dx[i] = (x[i] - x[i] ** 3 / 3 - y[i] + sigma / (2 * half) * pull_x) / epsilon
+        dy[i] = x[i] + b + sigma / (2 * half) * pull_y
+    return np.concatenate([dx, dy])
+
+
+# --- integrator -----------------------------------------------------------------------------------
+
+
+def rooted_trees(order):
+    """All rooted trees with so many vertices, each a sorted tuple of its branches."""
+    if order == 1:
+        return [()]
+    found = set()
+    for sizes in partitions(order - 1):
+        for branches in itertools.product(*map(rooted_trees, sizes)):
+            found.add(tuple(sorted(branches)))
+    return sorted(found)
+
+
+def partitions(total, largest=None):
+    """All ways to write a number as a sum, parts falling."""
+    if total == 0:
+        yield ()
+    for part in range(min(total, largest or total), 0, -1):
+        for rest in partitions(total - part, part):
+            yield (part, *rest)
+
+
+def vertices(tree):
+    """Number of vertices of a tree: its order."""
+    return 1 + sum(map(vertices, tree))
+
+
+def density(tree):
+    """Density of a tree: its order times the densities of its branches."""
+    return vertices(tree) * np.prod([density(branch) for branch in tree])
+
+
+def elementary_weights(tree, a):
+    """What each stage of a Runge-Kutta method contributes to the order condition of a tree."""
+    weights = np.ones(len(a))
+    for branch in tree:
+        weights = weights * (a @ elementary_weights(branch, a))
+    return weights
+
+
+def running_sum(terms):
+    """Sum from left to right, without an extra zero."""
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def runge_kutta(f, y, method, t_end, times, rtol, atol, max_steps=10**6):
+    """One trajectory, step by step as the documentation of the stepping loop says.
+
+    Returns the samples (n, rows), the last state, the numbers of accepted and of tried steps, and
+    the time reached.
+    """
+    t, k = 0.0, [f(y)]
+    h = first_step(f, y, k[0], method.order, rtol, atol, t_end)
+    log_before, rejected = math.log(1e-4), False
+    samples, accepted, tried = [], 0, 0
+    while len(samples) < len(times) and times[len(samples)] <= 0.0:
+        samples.append(y)
+    while t < t_end and tried < max_steps:
+        k = k[:1]
+        for row in range(1, method.stages):
+            y1 = y + h * running_sum([method.a[row, j] * k[j] for j in range(row)])
+            k.append(f(y1))
+        error = h * running_sum([e * stage for e, stage in zip(method.e, k, strict=True)])
+        size = np.where(np.abs(y) > np.abs(y1), np.abs(y), np.abs(y1))
+        log_error = log_norm(error / (atol + rtol * size))
+        tried += 1
+        if log_error > 0.0:
+            h, rejected = h * max(0.2, 0.9 * math.exp(-log_error / method.order)), True
+        else:
+            t1 = min(t + h, t_end)
+            while len(samples) < len(times) and times[len(samples)] <= t1:
+                theta = min((times[len(samples)] - t) / h, 1.0)
+                weights = np.zeros(method.stages)
+                for column in method.p.T[::-1]:
+                    weights = (weights + column) * theta
+                terms = [weight * stage for weight, stage in zip(weights, k, strict=True)]
+                samples.append(y + h * running_sum(terms))
+            bounded = max(log_error, math.log(1e-4))
+            factor = 0.9 * math.exp((0.4 * log_before - 0.7 * bounded) / method.order)
+            factor = min(10.0, max(0.2, factor))
+            h = h * (min(1.0, factor) if rejected else factor)
+            log_before, rejected = bounded, False
+            t, y, k = t1, y1, [k[-1]]
+            accepted += 1
+        if t + 1.01 * h >= t_end:
+            h = t_end - t
+    return np.array(samples), y, accepted, tried, t
+
+
+def log_norm(scaled):
+    """Logarithm of the root mean square, the squares added in four sums in turn."""
+    squares = scaled * scaled
+    whole = len(squares) // 4 * 4
+    sums = [0.0, 0.0, 0.0, 0.0]
+    for i in range(whole):
+        sums[i % 4] += squares[i]
+    for i in range(whole, len(squares)):
+        sums[0] += squares[i]
+    total = (sums[0] + sums[1]) + (sums[2] + sums[3])
+    return 0.5 * math.log(total / len(squares)) if total > 0.0 else math.log(1e-4)
+
+
+def first_step(f, y, slope, order, rtol, atol, t_end):
+    """Starting step size of Hairer, Norsett, Wanner, section II.4."""
+    scale = atol + rtol * np.abs(y)
+    d0, d1 = scaled_norm(y / scale), scaled_norm(slope / scale)
+    h = min(0.01 * d0 / d1 if d0 >= 1e-5 and d1 >= 1e-5 else 1e-6, t_end)
+    change = f(y + h * slope) - slope
+    d = max(d1, scaled_norm(change / scale) / h)
+    h1 = (0.01 / d) ** (1.0 / (order + 1.0)) if d > 1e-15 else max(1e-6, 1e-3 * h)
+    return min(100.0 * h, h1, t_end)
+
+
+def scaled_norm(ratios):
+    """Root mean square, added from left to right."""
+    return math.sqrt(running_sum([ratio * ratio for ratio in ratios]) / len(ratios))

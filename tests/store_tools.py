@@ -107,7 +107,7 @@ def make_store(folder: Path, *overrides: str) -> Store:
 def process_context() -> Any:
     """Return a maker of processes that start in milliseconds: a server has done the imports."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["store_tools"])
+    context.set_forkserver_preload(["chimera_hpc.store"])
     return context
 
 

@@ -15,7 +15,7 @@ import pytest
 from store_tools import claim_and_tell, process_context
 
 from chimera_hpc import claims, files, processes
-from chimera_hpc.claims import Claim, claim_block, live_claims
+from chimera_hpc.claims import Claim, claim_block, forget_points, live_claims
 from chimera_hpc.processes import is_gone, process_mark
 
 
@@ -83,6 +83,9 @@ def test_late_awakened_owner_neither_refreshes_nor_releases_what_he_lost(tmp_pat
     first.hand_back()
     assert second.still_mine()
     assert claim_block(tmp_path, 3, 9) is None
+    second.release()
+    first.hand_back()
+    assert list((tmp_path / "claims").iterdir()) == []
 
 
 def test_claim_made_anew_after_a_release_is_not_the_old_owners(tmp_path: Path) -> None:
@@ -116,6 +119,25 @@ def test_handed_back_block_is_free_at_once_but_counted(tmp_path: Path) -> None:
     assert [lost.handed_back for lost in second.lost] == [True]
     second.release()
     assert list((tmp_path / "claims").iterdir()) == []
+
+
+def test_last_word_of_a_process_that_used_too_much_memory_is_heard(tmp_path: Path) -> None:
+    first = taken(tmp_path)
+    first.blame_memory()
+    second = taken(tmp_path)
+    assert [(lost.handed_back, lost.out_of_memory) for lost in second.lost] == [(False, True)]
+    second.release()
+    second.blame_memory()
+    assert list((tmp_path / "claims").iterdir()) == []
+
+
+def test_claims_on_single_points_are_forgotten_with_their_block(tmp_path: Path) -> None:
+    for name in (3, "3_0", "3_11", "31_0", "13_1"):
+        assert claim_block(tmp_path, name, 1) is not None
+    assert set(live_claims(tmp_path)) == {3}
+    forget_points(tmp_path, 3)
+    names = sorted(path.name for path in (tmp_path / "claims").iterdir())
+    assert names == ["13_1.1.json", "3.1.json", "31_0.1.json"]
 
 
 def test_claim_of_a_killed_process_is_free_at_once(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_damaged_chunk_counts_as_never_run_and_is_named(store: Store, alter: str
 def test_strangers_among_the_chunks_are_passed_over(tmp_path: Path) -> None:
     store = fill(make_store(tmp_path))
     before = scan_ledger(store.path)
-    for name in (".c.0.0.x-1-2.ab.partial", "c.99.0", "c.x.0", "notes"):
+    for name in (".c.0.0.x-1-2.ab.partial", "c.99.0", "c.x.0", "c.1", "old.1.0"):
         (store.path / "ledger" / name).write_bytes(b"?")
     after = scan_ledger(store.path)
     assert after.damaged == before.damaged == ()
@@ -171,11 +171,14 @@ def test_unfinished_are_the_never_run_and_the_failures_asked_for() -> None:
     columns = {
         "status": np.array([255, 1, 2, 4, 6, 8]),
         "attempts": np.array([0, 1, 1, 1, 2, 3]),
+        "run": np.array([0, 1, 1, 1, 2, 1]),
     }
     assert unfinished(columns).tolist() == [True, False, False, False, False, False]
     assert unfinished(columns, 3).tolist() == [True, False, False, True, True, False]
     only = unfinished(columns, 9, [Status.STEP_BUDGET])
     assert only.tolist() == [True, False, False, False, True, False]
+    earlier = unfinished(columns, 9, before=2)
+    assert earlier.tolist() == [True, False, False, True, False, True]
 
 
 def test_not_a_store_is_bad_input(tmp_path: Path) -> None:

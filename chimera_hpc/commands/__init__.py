@@ -1,8 +1,8 @@
 """The commands of the command line, one small file each.
 
 For developers: a command is a module with ``NAME``, ``HELP`` (one line), ``EPILOG`` (examples),
-``add_arguments(parser)`` and ``execute(args) -> int``, and one line in `COMMANDS`. At import it loads
-nothing heavy: `--help` must answer at once.
+``add_arguments(parser)`` and ``execute(args) -> int``, and one line in `COMMANDS`. At import it
+loads nothing heavy: `--help` must answer at once.
 """
 
 from __future__ import annotations
@@ -20,10 +20,8 @@ class Command(Protocol):
     HELP: str
     EPILOG: str
 
-    @staticmethod
-    def add_arguments(parser: ArgumentParser) -> None: ...
-    @staticmethod
-    def execute(args: Namespace) -> int: ...
+    def add_arguments(self, parser: ArgumentParser) -> None: ...
+    def execute(self, args: Namespace) -> int: ...
 
 
 COMMANDS: tuple[Command, ...] = (run, plan, status, reduce)

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.commands.arguments import add_folder, store_path
 from chimera_hpc.commands.exits import Exit
+from chimera_hpc.errors import BadInput
 
 NAME = "reduce"
 HELP = "make results.json, figures and the report from what is in the store"
@@ -24,6 +25,13 @@ def execute(args: Namespace) -> int:
     """Reduce the sweep in a folder, finished or not."""
     folder = store_path(args.folder).parent
     from chimera_hpc.outputs import reduce_sweep
+    from chimera_hpc.store import DamagedChunk
 
-    reduce_sweep(folder, make_figures=not args.no_figures, say=print)
+    try:
+        reduce_sweep(folder, make_figures=not args.no_figures, say=print)
+    except DamagedChunk as error:
+        raise BadInput(f"{args.folder}: {error}") from None
+    except OSError as error:
+        where = error.filename or args.folder
+        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
     return Exit.COMPLETE

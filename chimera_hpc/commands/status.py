@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from chimera_hpc.commands.arguments import add_folder, store_path
-from chimera_hpc.commands.exits import Exit
-from chimera_hpc.commands.plan import in_time
 from chimera_hpc.claims import live_claims
-from chimera_hpc.ledger import ledger_shape, read_metadata, scan_ledger
+from chimera_hpc.commands.arguments import add_folder, store_path
+from chimera_hpc.commands.estimate import in_time
+from chimera_hpc.commands.exits import Exit
+from chimera_hpc.ledger import LedgerScan, ledger_shape, read_metadata, scan_ledger
 from chimera_hpc.status import Status
 
 NAME = "status"
@@ -20,6 +22,7 @@ HELP = "say what is done, from the store alone, while a sweep runs or after"
 EPILOG = """examples:
   python -m chimera_hpc.sweep status results/quickstart
   python -m chimera_hpc.sweep status results/quickstart --json
+  python -m chimera_hpc.sweep status results/quickstart --failures
 """
 
 
@@ -27,6 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_folder(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--failures", action="store_true", help="list every failed point too")
 
 
 def execute(args: Namespace) -> int:
@@ -34,41 +38,61 @@ def execute(args: Namespace) -> int:
     path = store_path(args.folder)
     metadata = read_metadata(path)
     scan = scan_ledger(path, metadata)
-    codes = Counter(Status(code) for code in scan.columns["status"].tolist())
-    n_points, block_size = ledger_shape(metadata)
-    finished = np.isin(scan.columns["status"], [1, 2, 3])
-    mean = scan.columns["elapsed_us"][finished].mean() / 1e6 if finished.any() else None
-    state = {
-        "sweep": metadata["attributes"]["spec"]["name"],
-        "points": n_points,
-        "statuses": {code.name.lower(): codes[code] for code in Status if codes[code]},
-        "done": int(finished.sum()),
-        "failed": sum(count for code, count in codes.items() if code.is_failure),
-        "pending": codes[Status.NEVER],
-        "blocks": len(scan.written),
-        "blocks_written": int(scan.written.sum()),
-        "blocks_running": len(live_claims(path)),
-        "blocks_damaged": len(scan.damaged),
-        "seconds_a_point": mean,
-        "core_seconds_left": None if mean is None else mean * codes[Status.NEVER],
-    }
+    state = state_of(path, metadata, scan)
     if args.json:
         print(json.dumps(state))
     else:
-        _print(state, codes)
+        _print(state)
+    if args.failures and not args.json:
+        _print_failures(path, args.folder)
     return Exit.FAILURES if state["failed"] else Exit.COMPLETE
 
 
-def _print(state: dict[str, object], codes: Counter[Status]) -> None:
-    share = 100 * int(str(state["done"])) / max(1, int(str(state["points"])))
+def state_of(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> dict[str, Any]:
+    """Return what `status --json` prints."""
+    n_points, _ = ledger_shape(metadata)
+    codes = scan.columns["status"]
+    counts = {code: int(np.count_nonzero(codes == code)) for code in Status}
+    finished = (codes >= Status.DONE) & (codes <= Status.NO_WINDOW)
+    mean = scan.columns["elapsed_us"][finished].mean() / 1e6 if finished.any() else None
+    return {
+        "sweep": metadata["attributes"]["spec"].get("name", "?"),
+        "points": n_points,
+        "statuses": {code.name.lower(): n for code, n in counts.items() if n},
+        "done": int(np.count_nonzero(finished)),
+        "failed": sum(n for code, n in counts.items() if code.is_failure),
+        "pending": counts[Status.NEVER],
+        "blocks": len(scan.written),
+        "blocks_written": int(np.count_nonzero(scan.written)),
+        "blocks_running": len(live_claims(path)),
+        "blocks_damaged": len(scan.damaged),
+        "seconds_a_point": mean,
+        "core_seconds_left": None if mean is None else mean * counts[Status.NEVER],
+    }
+
+
+def _print(state: Mapping[str, Any]) -> None:
+    share = 100 * state["done"] / max(1, state["points"])
     print(f"{state['sweep']}: {state['done']} of {state['points']} points done ({share:.1f} %)")
     for code in Status:
-        if codes[code]:
-            print(f"  {codes[code]:>9}  {code.sentence}")
+        count = state["statuses"].get(code.name.lower())
+        if count:
+            print(f"  {count:>9}  {code.sentence}")
     print(
         f"  blocks: {state['blocks_written']} of {state['blocks']} written, "
         f"{state['blocks_running']} running, {state['blocks_damaged']} damaged"
     )
     left = state["core_seconds_left"]
-    if isinstance(left, float) and left > 0:
-        print(f"  about {in_time(left)} of one core to go, {state['seconds_a_point']:.3g} s a point")
+    if left:
+        print(
+            f"  about {in_time(left)} of one core to go, {state['seconds_a_point']:.3g} s a point"
+        )
+
+
+def _print_failures(path: Path, folder: Path) -> None:
+    from chimera_hpc.commands.ending import failures
+    from chimera_hpc.store import Store
+
+    store = Store.open(path)
+    for line in failures(store, folder, most=store.n_points):
+        print(line)

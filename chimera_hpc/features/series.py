@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from chimera_hpc.integrate._jit import jit
 
 _TILE = 64
@@ -28,5 +30,6 @@ def quantise(rows: Any, scale: float, missing: int, out: Any) -> None:
         last = min(first + _TILE, n_times)
         for i in range(n_nodes):
             for t in range(first, last):
-                steps = round(rows[i, t] / scale)
-                out[t, i] = steps if abs(steps) <= limit else missing
+                # Compared before it is an integer: the integer of a NaN is anything.
+                steps = np.rint(rows[i, t] / scale)
+                out[t, i] = int(steps) if abs(steps) <= limit else missing

@@ -7,9 +7,12 @@ the points; the number of nodes is one for a whole sweep.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -18,7 +21,8 @@ from numpy.typing import NDArray
 from chimera_hpc.errors import BadInput
 
 Column = NDArray[np.int64 | np.float64]
-METHODS = ("tsit5", "dopri5")
+_MODULE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
+METHODS = ("tsit5", "dopri5", "verner6")
 """Names of the integrators that a job may ask for."""
 
 
@@ -106,10 +110,46 @@ def nearest(name: str, known: list[str]) -> str:
 
 
 def parameters_of(model: str) -> ModelParameters:
-    """Return the table of a model; raise BadInput for a name that is not in `MODELS`."""
+    """Return the table of a model; raise BadInput for a name that is not in `MODELS`.
+
+    ``package.module:object`` is a user's own model, see `user_model`.
+    """
+    if ":" in model:
+        table: ModelParameters = user_model(model).parameters
+        return table
     if model not in MODELS:
         raise BadInput(f"model: {short(model)} is not a known model{nearest(model, list(MODELS))}")
     return MODELS[model]
+
+
+@cache
+def user_model(name: str) -> Any:
+    """Return the object that ``package.module:object`` names.
+
+    It has ``parameters``, a `ModelParameters`, and ``build(sweep, row)``, which returns what
+    `chimera_hpc.models.Model` lists for the point with this row of columns. The module is imported
+    from the Python path (``PYTHONPATH=FOLDER``), by the workers too.
+
+    Raises
+    ------
+    BadInput
+        When there is no such module, it cannot be imported, or the object is not a model.
+    """
+    module, _, attribute = name.partition(":")
+    where = f"model: {short(name)}"
+    if not (_MODULE.fullmatch(module) and attribute.isidentifier()):
+        raise BadInput(f"{where} is not of the form package.module:object")
+    try:
+        found = getattr(import_module(module), attribute)
+    except Exception as error:
+        # Whatever the user's module does when it is imported.
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        raise BadInput(f"{where} can't be imported: {text}") from None
+    if not isinstance(getattr(found, "parameters", None), ModelParameters):
+        raise BadInput(f"{where} has no attribute parameters of type ModelParameters")
+    if not callable(getattr(found, "build", None)):
+        raise BadInput(f"{where} has no method build(sweep, row)")
+    return found
 
 
 SEED = Parameter("seed", int, None, "Number of the random initial state.", low=0, high=2**63 - 1)
@@ -138,15 +178,18 @@ MODELS: dict[str, ModelParameters] = {
             Parameter("b", float, 0.5, "Excitability."),
             Parameter("c", float, -0.01, "Self-coupling of the links."),
             Parameter("flips", int, 0, "Links reversed at random, Q_r.", low=0, high=10**15),
+            Parameter(
+                "flip_set", int, 0, "Links to draw those from: 0 all, 1 node 1's.", low=0, high=1
+            ),
         ),
         limits=(
             _RING_LIMIT,
             Limit("Q", ("P",), lambda columns, _: columns["P"], "Q may not exceed P"),
             Limit(
                 "flips",
-                ("P",),
-                lambda columns, n: n * columns["P"],
-                "flips may not exceed the number of links, n_nodes * P",
+                ("P", "flip_set"),
+                lambda columns, n: np.where(columns["flip_set"] == 1, 2, n) * columns["P"],
+                "flips may not exceed the number of links, n_nodes * P (2 P of them at node 1)",
             ),
         ),
         forms=("reduced", "full"),

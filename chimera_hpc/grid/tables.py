@@ -202,6 +202,12 @@ class Run(Table):
     tighten: float = Field(
         0.1, gt=0, le=1, description="Factor on rtol and atol at each further try."
     )
+    patience: float = Field(
+        60.0,
+        ge=1,
+        le=86400,
+        description="Seconds without a sign of life after which a worker counts as lost.",
+    )
 
 
 class Slurm(Table):

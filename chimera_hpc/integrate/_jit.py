@@ -19,6 +19,9 @@ from typing import Any
 
 import numba
 
+# Typed loosely: numba's annotations know neither its configuration nor the option ``_nrt``.
+_numba: Any = numba
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("integrate", "models", "features")
 
@@ -58,17 +61,18 @@ def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """``numba.njit`` as every kernel of the project uses it.
 
     Strict IEEE arithmetic (no fast-math flag of any kind, so a sum keeps its order and a NaN
-    stays a NaN), the GIL released, NumPy's rules for division, compiled code kept on disk.
+    stays a NaN), the GIL released, NumPy's rules for division, compiled code kept on disk, and no
+    runtime for memory: a kernel that allocates doesn't compile.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = cache_folder()
+        before = _numba.config.CACHE_DIR
+        _numba.config.CACHE_DIR = cache_folder()
         try:
-                return numba.njit(*signature, cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(
-                function
-            )
+            return _numba.njit(
+                *signature, cache=True, nogil=True, error_model="numpy", _nrt=False, **options
+            )(function)
         finally:
-            numba.config.CACHE_DIR = before
+            _numba.config.CACHE_DIR = before
 
     return decorate

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 # Wall time that one call of the compiled loop aims at, seconds: the GIL comes back, time-outs and
 # stop signals are seen.
 SLICE = 0.1
+# Steps times numbers of the state in the first call, before the speed is known, and most steps in it.
+FIRST_WORK, FIRST_STEPS = 2_000_000, 64
 # Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
 SAMPLE_BYTES = 96_000_000
 # Fewer trajectories than this go one by one: idle lanes of a pack cost as much as busy ones.
@@ -64,7 +66,8 @@ class Control:
     @property
     def times(self) -> Array:
         """Sampling times, shape (n_samples,)."""
-        return np.minimum(self.start + np.arange(self.n_samples) * self.step, self.t_end)
+        times: Array = np.minimum(self.start + np.arange(self.n_samples) * self.step, self.t_end)
+        return times
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class Outcome:
     """One trajectory's end: status, work done, sampled rows and last state.
 
     ``samples`` (n_observed, n_samples) is a view of a buffer that is used again: take what is
-    needed before returning; ``n_sampled`` of its columns were reached. ``status`` is DONE or one of the integrator's failures.
+    needed before returning; ``n_sampled`` of its columns were reached. ``status`` is DONE or one
+    of the integrator's failures.
     """
 
     status: Status
@@ -113,25 +117,25 @@ class Lanes:
         self.count[K.STATE] = K.IDLE
         self.weights = aligned(method.stages, lanes)
         self.samples = np.zeros((lanes, n_observed, control.n_samples))
-        self.iterations = 64
+        self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
-    def put(self, l: int, y0: Array, params: Array) -> None:  # noqa: E741
-        """Begin a trajectory in lane ``l``."""
-        self.y[:, l] = y0
-        self.params[:, l] = params
-        self.lane[:, l] = 0.0
-        self.lane[K.LOG_ERROR, l] = K.LOG_ERROR_FLOOR
-        self.count[:, l] = 0
-        self.count[K.STATE, l] = K.FRESH
+    def put(self, m: int, y0: Array, params: Array) -> None:
+        """Begin a trajectory in lane ``m``."""
+        self.y[:, m] = y0
+        self.params[:, m] = params
+        self.lane[:, m] = 0.0
+        self.lane[K.LOG_ERROR, m] = K.LOG_ERROR_FLOOR
+        self.count[:, m] = 0
+        self.count[K.STATE, m] = K.FRESH
         if self.control.start <= 0.0:
-            self.samples[l, :, 0] = y0[: self.samples.shape[1]]
-            self.count[K.NEXT_SAMPLE, l] = 1
+            self.samples[m, :, 0] = y0[: self.samples.shape[1]]
+            self.count[K.NEXT_SAMPLE, m] = 1
 
-    def clear(self, l: int) -> None:  # noqa: E741
-        """Empty lane ``l``: zeros everywhere, so that it computes zeros until it is used again."""
-        self.y[:, l] = self.y1[:, l] = self.k[:, l] = 0.0
-        self.lane[:, l] = 0.0
-        self.count[K.STATE, l] = K.IDLE
+    def clear(self, m: int) -> None:
+        """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""
+        self.y[:, m] = self.y1[:, m] = self.k[:, m] = 0.0
+        self.lane[:, m] = 0.0
+        self.count[K.STATE, m] = K.IDLE
 
     def run(self) -> float:
         """Call the compiled loop once; returns the wall time it took, seconds."""
@@ -199,26 +203,26 @@ def integrate(
     spent = np.zeros(width)
     since = np.zeros(width)
 
-    def fill(l: int) -> None:  # noqa: E741
+    def fill(m: int) -> None:
         number = next(waiting, None)
-        holds[l] = number
+        holds[m] = number
         if number is None:
-            pool.clear(l)
+            pool.clear(m)
             return
-        pool.put(l, initial(number), systems[number].lane_params)
-        spent[l], since[l] = 0.0, time.perf_counter()
+        pool.put(m, initial(number), systems[number].lane_params)
+        spent[m], since[m] = 0.0, time.perf_counter()
 
-    for l in range(width):  # noqa: E741
-        fill(l)
+    for m in range(width):
+        fill(m)
     while any(number is not None for number in holds):
         if should_stop is not None and should_stop():
             raise Stopped
-        busy = [l for l in range(width) if holds[l] is not None]
+        busy = [m for m in range(width) if holds[m] is not None]
         spent[busy] += pool.run() / len(busy)
         now = time.perf_counter()
-        for l in busy:  # noqa: E741
-            number, state = holds[l], int(pool.count[K.STATE, l])
-            if state == K.RUNNING and now - since[l] > control.time_out:
+        for m in busy:
+            number, state = holds[m], int(pool.count[K.STATE, m])
+            if state == K.RUNNING and now - since[m] > control.time_out:
                 state = int(Status.TIME_OUT)
             if state == K.RUNNING or number is None:
                 continue
@@ -226,11 +230,11 @@ def integrate(
                 number,
                 Outcome(
                     Status(state),
-                    int(pool.count[K.ACCEPTED, l]),
-                    float(spent[l]),
-                    pool.samples[l],
-                    int(pool.count[K.NEXT_SAMPLE, l]),
-                    pool.y[:, l].copy(),
+                    int(pool.count[K.ACCEPTED, m]),
+                    float(spent[m]),
+                    pool.samples[m],
+                    int(pool.count[K.NEXT_SAMPLE, m]),
+                    pool.y[:, m].copy(),
                 ),
             )
-            fill(l)
+            fill(m)

@@ -4,9 +4,9 @@ Each lane has its own time, step size and outcome; all of them go through the st
 Nothing is allocated here and nothing raises: a lane that can't go on gets a status.
 
 Notation of Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I* (HNW),
-secs. II.4 and II.6: ``y`` and ``y1`` are the states before and after the step, ``k`` holds the stages
-one after the other, rows ``j * rows ... (j + 1) * rows - 1`` being stage j. The first stage of a step is
-the last of the one before; instead of a copy, the two change places (``first``).
+secs. II.4 and II.6: ``y`` and ``y1`` are the states before and after the step, ``k`` holds the
+stages one after the other, rows ``j * rows ... (j + 1) * rows - 1`` being stage j. The first stage
+of a step is the last of the one before; instead of a copy, the two change places (``first``).
 """
 
 from __future__ import annotations
@@ -108,10 +108,11 @@ def _stage_sum(like: Any, y: Any, lane: Any, k: Any, first: Any, a: Any, s: Any,
 
 @jit()
 def _error_sum(
-    like: Any, y: Any, y1: Any, lane: Any, k: Any, first: Any, e: Any, rtol: Any, atol: Any, work: Any
-) -> None:
-    # sum_i (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2, HNW eq. II.4.11 without the root; the rows
-    # go to four sums in turn, which are then added in a fixed order.
+    like: Any, y: Any, y1: Any, lane: Any, k: Any, first: Any, e: Any, rtol: Any, atol: Any,
+    work: Any,
+) -> None:  # fmt: skip
+    # sum_i (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2, HNW eq. II.4.11 without the root; the
+    # rows go to four sums in turn, which are then added in a fixed order.
     rows = y.shape[0]
     stages = e.size
     last = rows * (stages - 1) - first
@@ -129,11 +130,12 @@ def _error_sum(
             store(work, i, ratio * ratio)
     else:
         for i in range(rows):
-            total = e[0] * load(like, k, first + i) + e[stages - 1] * load(like, k, last + i)
+            total = e[0] * load(like, k, first + i)
             for j in range(1, stages - 1):
                 total = total + e[j] * load(like, k, j * rows + i)
+            total = h * (total + e[stages - 1] * load(like, k, last + i))
             size = larger(magnitude(load(like, y, i)), magnitude(load(like, y1, i)))
-            ratio = h * total / (atol + rtol * size)
+            ratio = total / (atol + rtol * size)
             store(work, i, ratio * ratio)
     zero = like
     s0, s1, s2, s3 = zero, zero, zero, zero
@@ -149,12 +151,14 @@ def _error_sum(
 
 
 @jit()
-def _scaled_norm(a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, l: Any, rtol: Any, atol: Any) -> Any:  # noqa: E741
-    # Norm of a - weight * b in the error scale of y, in lane l; a, b start at rows a0, b0.
+def _scaled_norm(
+    a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, m: Any, rtol: Any, atol: Any
+) -> Any:
+    # Norm of a - weight * b in the error scale of y, in lane m; a, b start at rows a0, b0.
     rows = y.shape[0]
     total = 0.0
     for i in range(rows):
-        ratio = (a[a0 + i, l] - weight * b[b0 + i, l]) / (atol + rtol * abs(y[i, l]))
+        ratio = (a[a0 + i, m] - weight * b[b0 + i, m]) / (atol + rtol * abs(y[i, m]))
         total += ratio * ratio
     return math.sqrt(total / rows)
 
@@ -163,32 +167,32 @@ def _scaled_norm(a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, l: Any, 
 def _start(
     rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, first: Any, lane: Any, count: Any,
     order: Any, rtol: Any, atol: Any, t_end: Any,
-) -> None:
+) -> None:  # fmt: skip
     # First derivative and first step size of the lanes just put in, HNW sec. II.4 ("Starting
     # step size"); the rows of the other lanes are not touched.
     rows, lanes = y.shape
     s1, s2 = rows, 2 * rows
     rhs(y, k[s1 : s1 + rows], params, ints)
-    for l in range(lanes):  # noqa: E741
-        if count[STATE, l] == FRESH:
+    for m in range(lanes):
+        if count[STATE, m] == FRESH:
             for i in range(rows):
-                k[first + i, l] = k[s1 + i, l]
-            d0 = _scaled_norm(y, y, 0.0, y, 0, 0, l, rtol, atol)
-            d1 = _scaled_norm(k, y, 0.0, y, first, 0, l, rtol, atol)
+                k[first + i, m] = k[s1 + i, m]
+            d0 = _scaled_norm(y, y, 0.0, y, 0, 0, m, rtol, atol)
+            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, rtol, atol)
             h = 1e-6
             if d0 >= 1e-5 and d1 >= 1e-5:
                 h = 0.01 * d0 / d1
-            lane[STEP, l] = min(h, t_end)
-    for l in range(lanes):  # noqa: E741
-        h = lane[STEP, l] if count[STATE, l] == FRESH else 0.0
+            lane[STEP, m] = min(h, t_end)
+    for m in range(lanes):
+        h = lane[STEP, m] if count[STATE, m] == FRESH else 0.0
         for i in range(rows):
-            y1[i, l] = y[i, l] + h * k[s1 + i, l]
+            y1[i, m] = y[i, m] + h * k[s1 + i, m]
     rhs(y1, k[s2 : s2 + rows], params, ints)
-    for l in range(lanes):  # noqa: E741
-        if count[STATE, l] == FRESH:
-            h = lane[STEP, l]
-            d1 = _scaled_norm(k, y, 0.0, y, first, 0, l, rtol, atol)
-            d2 = _scaled_norm(k, k, 1.0, y, s2, s1, l, rtol, atol) / h
+    for m in range(lanes):
+        if count[STATE, m] == FRESH:
+            h = lane[STEP, m]
+            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, rtol, atol)
+            d2 = _scaled_norm(k, k, 1.0, y, s2, s1, m, rtol, atol) / h
             d = max(d1, d2)
             h1 = max(1e-6, h * 1e-3)
             if d > 1e-15:
@@ -196,29 +200,29 @@ def _start(
             h = min(100.0 * h, h1, t_end)
             if not (h > 0.0):
                 h = 1e-6
-            lane[STEP, l] = h
-            count[STATE, l] = RUNNING
+            lane[STEP, m] = h
+            count[STATE, m] = RUNNING
 
 
 @jit()
 def _judge(lane: Any, count: Any, rows: Any, t_end: Any) -> Any:
     # Accept or reject the step of each running lane; returns the number of lanes rejected.
     rejected = 0
-    for l in range(lane.shape[1]):  # noqa: E741
-        if count[STATE, l] != RUNNING:
+    for m in range(lane.shape[1]):
+        if count[STATE, m] != RUNNING:
             continue
-        count[TRIED, l] += 1
-        error_sum = lane[ERROR_SUM, l]
+        count[TRIED, m] += 1
+        error_sum = lane[ERROR_SUM, m]
         log_error = LOG_ERROR_FLOOR
         if not math.isfinite(error_sum):
             log_error = math.inf
         elif error_sum > 0.0:
             log_error = 0.5 * math.log(error_sum / rows)
-        lane[LOG_ERROR_NEW, l] = log_error
-        lane[TIME_NEW, l] = lane[TIME, l]
+        lane[LOG_ERROR_NEW, m] = log_error
+        lane[TIME_NEW, m] = lane[TIME, m]
         if log_error <= 0.0:
-            t_new = lane[TIME, l] + lane[STEP, l]
-            lane[TIME_NEW, l] = min(t_new, t_end)
+            t_new = lane[TIME, m] + lane[STEP, m]
+            lane[TIME_NEW, m] = min(t_new, t_end)
         else:
             rejected += 1
     return rejected
@@ -226,9 +230,9 @@ def _judge(lane: Any, count: Any, rows: Any, t_end: Any) -> Any:
 
 @jit()
 def _sample(
-    like: Any, y: Any, k: Any, first: Any, work: Any, lane: Any, count: Any, p: Any, start: Any, step: Any,
-    t_end: Any, weights: Any, samples: Any,
-) -> None:
+    like: Any, y: Any, k: Any, first: Any, work: Any, lane: Any, count: Any, p: Any, start: Any,
+    step: Any, t_end: Any, weights: Any, samples: Any,
+) -> None:  # fmt: skip
     # Values of the observed rows at the sampling times that the accepted steps cover, by the
     # continuous extension; the lanes take their first, second, ... sample of the step together.
     rows, lanes = y.shape
@@ -238,23 +242,23 @@ def _sample(
     h = load(like, lane, STEP)
     while True:
         due = 0
-        for l in range(lanes):  # noqa: E741
-            at = count[NEXT_SAMPLE, l]
+        for m in range(lanes):
+            at = count[NEXT_SAMPLE, m]
             t = min(start + at * step, t_end)
             is_due = (
-                count[STATE, l] == RUNNING
+                count[STATE, m] == RUNNING
                 and at < total
-                and lane[LOG_ERROR_NEW, l] <= 0.0
-                and t <= lane[TIME_NEW, l]
+                and lane[LOG_ERROR_NEW, m] <= 0.0
+                and t <= lane[TIME_NEW, m]
             )
-            count[IS_DUE, l] = is_due
+            count[IS_DUE, m] = is_due
             due += is_due
-            theta = min((t - lane[TIME, l]) / lane[STEP, l], 1.0) if is_due else 0.0
+            theta = min((t - lane[TIME, m]) / lane[STEP, m], 1.0) if is_due else 0.0
             for j in range(stages):
                 weight = 0.0
                 for d in range(degree - 1, -1, -1):
                     weight = (weight + p[j, d]) * theta
-                weights[j, l] = weight
+                weights[j, m] = weight
         if due == 0:
             return
         for i in range(samples.shape[1]):
@@ -263,60 +267,60 @@ def _sample(
                 value = value + load(like, weights, j) * load(like, k, j * rows + i)
             value = value + load(like, weights, stages - 1) * load(like, k, last + i)
             store(work, i, load(like, y, i) + h * value)
-        for l in range(lanes):  # noqa: E741
-            if count[IS_DUE, l] == 1:
-                at = count[NEXT_SAMPLE, l]
+        for m in range(lanes):
+            if count[IS_DUE, m] == 1:
+                at = count[NEXT_SAMPLE, m]
                 for i in range(samples.shape[1]):
-                    samples[l, i, at] = work[i, l]
-                count[NEXT_SAMPLE, l] = at + 1
+                    samples[m, i, at] = work[i, m]
+                count[NEXT_SAMPLE, m] = at + 1
 
 
 @jit()
-def _next_step(lane: Any, count: Any, l: Any, order: Any, t_end: Any, max_steps: Any) -> None:  # noqa: E741
-    # Move lane l on and choose its next step size, or end it.
-    log_error = lane[LOG_ERROR_NEW, l]
+def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps: Any) -> None:
+    # Move lane m on and choose its next step size, or end it.
+    log_error = lane[LOG_ERROR_NEW, m]
     if log_error <= 0.0:
         bounded = max(log_error, LOG_ERROR_FLOOR)
-        factor = SAFETY * math.exp((MEMORY * lane[LOG_ERROR, l] - EXPONENT * bounded) / order)
+        factor = SAFETY * math.exp((MEMORY * lane[LOG_ERROR, m] - EXPONENT * bounded) / order)
         factor = min(LARGEST, max(SMALLEST, factor))
-        if count[REJECTED_LAST, l] == 1:
+        if count[REJECTED_LAST, m] == 1:
             factor = min(1.0, factor)
-        lane[LOG_ERROR, l] = bounded
-        count[REJECTED_LAST, l] = 0
-        count[ACCEPTED, l] += 1
-        lane[TIME, l] = lane[TIME_NEW, l]
-        if lane[TIME, l] >= t_end:
-            count[STATE, l] = _DONE
+        lane[LOG_ERROR, m] = bounded
+        count[REJECTED_LAST, m] = 0
+        count[ACCEPTED, m] += 1
+        lane[TIME, m] = lane[TIME_NEW, m]
+        if lane[TIME, m] >= t_end:
+            count[STATE, m] = _DONE
     else:
         factor = max(SMALLEST, SAFETY * math.exp(-log_error / order))
-        count[REJECTED_LAST, l] = 1
-    t = lane[TIME, l]
-    h = lane[STEP, l] * factor
-    if count[STATE, l] == RUNNING:
+        count[REJECTED_LAST, m] = 1
+    t = lane[TIME, m]
+    h = lane[STEP, m] * factor
+    if count[STATE, m] == RUNNING:
         if h <= 1e-14 * max(abs(t), 1e-3):
-            count[STATE, l] = _STEP_TOO_SMALL if math.isfinite(log_error) else _NON_FINITE
-        elif count[TRIED, l] >= max_steps:
-            count[STATE, l] = _STEP_BUDGET
+            count[STATE, m] = _STEP_TOO_SMALL if math.isfinite(log_error) else _NON_FINITE
+        elif count[TRIED, m] >= max_steps:
+            count[STATE, m] = _STEP_BUDGET
     # A step that would end just short of t_end is stretched to it: no sliver is left over.
     if t + 1.01 * h >= t_end:
         h = t_end - t
-    lane[STEP, l] = h if count[STATE, l] == RUNNING else 0.0
+    lane[STEP, m] = h if count[STATE, m] == RUNNING else 0.0
 
 
 @jit()
 def _advance(
-    like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, work: Any, lane: Any, count: Any,
-    a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any, max_steps: Any, start: Any,
-    step: Any, weights: Any, samples: Any, iterations: Any,
-) -> Any:
+    like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, work: Any, lane: Any,
+    count: Any, a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
+    max_steps: Any, start: Any, step: Any, weights: Any, samples: Any, iterations: Any,
+) -> Any:  # fmt: skip
     rows, lanes = y.shape
     stages = e.size
     first = 0
     n_fresh = 0
     n_running = 0
-    for l in range(lanes):  # noqa: E741
-        n_fresh += count[STATE, l] == FRESH
-        n_running += count[STATE, l] == RUNNING
+    for m in range(lanes):
+        n_fresh += count[STATE, m] == FRESH
+        n_running += count[STATE, m] == RUNNING
     if n_fresh > 0:
         _start(rhs, params, ints, y, y1, k, first, lane, count, order, rtol, atol, t_end)
         n_running += n_fresh
@@ -333,16 +337,16 @@ def _advance(
         rejected = _judge(lane, count, rows, t_end)
         _sample(like, y, k, first, work, lane, count, p, start, step, t_end, weights, samples)
         if rejected > 0:
-            for l in range(lanes):  # noqa: E741
-                if count[STATE, l] == RUNNING and lane[LOG_ERROR_NEW, l] > 0.0:
+            for m in range(lanes):
+                if count[STATE, m] == RUNNING and lane[LOG_ERROR_NEW, m] > 0.0:
                     for i in range(rows):
-                        y1[i, l] = y[i, l]
-                        k[last + i, l] = k[first + i, l]
+                        y1[i, m] = y[i, m]
+                        k[last + i, m] = k[first + i, m]
         still = 0
-        for l in range(lanes):  # noqa: E741
-            if count[STATE, l] == RUNNING:
-                _next_step(lane, count, l, order, t_end, max_steps)
-                still += count[STATE, l] == RUNNING
+        for m in range(lanes):
+            if count[STATE, m] == RUNNING:
+                _next_step(lane, count, m, order, t_end, max_steps)
+                still += count[STATE, m] == RUNNING
         y, y1 = y1, y
         swapped = not swapped
         first = last
@@ -350,12 +354,12 @@ def _advance(
     # Hand the state back where it came from.
     if swapped:
         for i in range(rows):
-            for l in range(lanes):  # noqa: E741
-                y1[i, l] = y[i, l]
+            for m in range(lanes):
+                y1[i, m] = y[i, m]
     if first != 0:
         for i in range(rows):
-            for l in range(lanes):  # noqa: E741
-                k[i, l] = k[first + i, l]
+            for m in range(lanes):
+                k[i, m] = k[first + i, m]
     return done
 
 
@@ -370,34 +374,35 @@ _SIGNATURE = types.int64(
 )
 
 
-def _advance_one(
+def _advance_one(  # type: ignore[no-untyped-def]
     rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end, max_steps,
     start, step, weights, samples, iterations,
-):  # type: ignore[no-untyped-def]
+):  # fmt: skip
     return _advance(
         0.0, rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end,
         max_steps, start, step, weights, samples, iterations,
-    )
+    )  # fmt: skip
 
 
-def _advance_pack(
+def _advance_pack(  # type: ignore[no-untyped-def]
     rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end, max_steps,
     start, step, weights, samples, iterations,
-):  # type: ignore[no-untyped-def]
+):  # fmt: skip
     return _advance(
-        splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end,
-        max_steps, start, step, weights, samples, iterations,
-    )
+        splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol,
+        t_end, max_steps, start, step, weights, samples, iterations,
+    )  # fmt: skip
 
 
 @cache
 def advance(lanes: int) -> Any:
     """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
 
-    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, a, e, p, order, rtol,
-    atol, t_end, max_steps, start, step, weights, samples, iterations)`` tries at most ``iterations``
-    steps in every running lane and comes back as soon as a lane has ended; it returns how many
-    it tried. Lanes marked `FRESH` are started first: first derivative, first step size.
+    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, a, e, p, order,
+    rtol, atol, t_end, max_steps, start, step, weights, samples, iterations)`` tries at most
+    ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
+    returns how many it tried. Lanes marked `FRESH` are started first: first derivative, first step
+    size.
     """
     if lanes not in (1, LANES):
         raise ValueError(f"the stepping loop is compiled for 1 and {LANES} lanes, not {lanes}")

@@ -42,9 +42,9 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
 @register_model(PackType)
-class _PackModel(models.PrimitiveModel):  # type: ignore[misc]
+class _PackModel(models.PrimitiveModel):
     def __init__(self, manager: Any, pack: Any) -> None:
-        super().__init__(manager, pack, _VECTOR)
+        super().__init__(manager, pack, _VECTOR)  # type: ignore[no-untyped-call]
 
 
 def _row_pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
@@ -52,7 +52,8 @@ def _row_pointer(context: Any, builder: Any, array_type: Any, array: Any, row: A
     return builder.gep(struct.data, [row])
 
 
-if numba.config.DISABLE_JIT:
+_config: Any = numba.config  # its attributes are made at run time
+if _config.DISABLE_JIT:
 
     def splat(value: float) -> Any:
         """Give a pack with ``value`` in every lane."""
@@ -138,10 +139,9 @@ else:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             kind = args[0].type
             name = f"llvm.fabs.{'f64' if kind == ir.DoubleType() else f'v{LANES}f64'}"
-            function = cgutils.get_or_insert_function(
-                builder.module, ir.FunctionType(kind, [kind]), name
-            )
-            return builder.call(function, args)
+            kind = ir.FunctionType(kind, [kind])
+            insert: Any = cgutils.get_or_insert_function
+            return builder.call(insert(builder.module, kind, name), args)
 
         return a(a), generate
 

@@ -84,7 +84,8 @@ class Tableau:
     @cached_property
     def b(self) -> Coefficients:
         """Weights of the solution, shape (s,)."""
-        return self.a[-1]
+        weights: Coefficients = self.a[-1]
+        return weights
 
     @cached_property
     def c(self) -> Coefficients:

@@ -1,18 +1,22 @@
 """The models, and how a point of a sweep becomes one of them.
 
 For developers: a model is one small file with a frozen dataclass that has what `Model` lists, one
-line in `_BUILDERS`, and its table of parameters in `grid.parameters`.
+line in `_BUILDERS`, and its table of parameters in `grid.parameters`. A user's own model needs no
+line anywhere, see `grid.parameters.user_model`; `check_user_model` tells what is wrong with one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Sweep
+from chimera_hpc.grid.parameters import short, user_model
+from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
 from chimera_hpc.streams import initial_stream, topology_stream
@@ -25,9 +29,9 @@ Row = Mapping[str, int | float]
 class Model(Protocol):
     """What the integrator and the task ask of a model with its parameters.
 
-    ``right_hand_side`` is compiled with the signature `integrate.kernel.RIGHT_HAND_SIDE` and works on
-    (rows, lanes); ``int_params`` are shared by the lanes of a call, ``lane_params`` is one lane's
-    column. The first ``n_nodes`` rows are the observed signal u.
+    ``right_hand_side`` is compiled with the signature `integrate.kernel.RIGHT_HAND_SIDE` and works
+    on (rows, lanes); ``int_params`` are shared by the lanes of a call, ``lane_params`` is one
+    lane's column. The first ``n_nodes`` rows are the observed signal u.
     """
 
     @property
@@ -54,7 +58,9 @@ class Model(Protocol):
 
 def stream_key(sweep: Sweep, row: Row) -> tuple[str, int, int, int, int, int]:
     """Return what the random streams of a point depend on: model, N0, orientation, P, Q, seed."""
-    numbers = (sweep.n_nodes, row["orientation"], row["P"], row.get("Q", 0), row["seed"])
+    # A user's model need not know orientation, P or Q.
+    ring = (row.get("orientation", 1), row.get("P", 0), row.get("Q", 0))
+    numbers = (sweep.n_nodes, *ring, row["seed"])
     n_nodes, orientation, half_degree, reoriented, seed = (int(number) for number in numbers)
     return sweep.model, n_nodes, orientation, half_degree, reoriented, seed
 
@@ -65,7 +71,8 @@ def _topological(sweep: Sweep, row: Row) -> TopologicalFHN:
     flips = int(row["flips"])
     if flips:
         stream = topology_stream(*stream_key(sweep, row), flips)
-        topology = topology.reorient_random(flips, stream)
+        among = topology.links_at(0) if int(row["flip_set"]) == 1 else None
+        topology = topology.reorient_random(flips, stream, among)
     return TopologicalFHN(topology, row["epsilon"], row["b"], row["c"], sweep.integrator.form)
 
 
@@ -75,12 +82,59 @@ def _networked(sweep: Sweep, row: Row) -> NetworkedFHN:
     )
 
 
-_BUILDERS = {"topological_fhn": _topological, "networked_fhn": _networked}
+_BUILDERS: dict[str, Callable[[Sweep, Row], Model]] = {
+    "topological_fhn": _topological,
+    "networked_fhn": _networked,
+}
 
 
 def build(sweep: Sweep, row: Row) -> Model:
     """Return the model of one point, from its row of columns."""
-    return _BUILDERS[sweep.model](sweep, row)
+    builder = _BUILDERS.get(sweep.model) or user_model(sweep.model).build
+    model: Model = builder(sweep, row)
+    return model
+
+
+def check_user_model(sweep: Sweep, row: Row) -> None:
+    """Build a user's model for one point and try all that `Model` lists.
+
+    Raises
+    ------
+    BadInput
+        With what is missing, or of the wrong kind or shape.
+    """
+    where = f"model: {short(sweep.model)}"
+    try:
+        model = build(sweep, row)
+        u, v = initial_state(sweep, row, model)
+        state = np.asarray(model.state(u, v))
+        _expect(where, "state(u, v)", state.shape, (model.n_rows,))
+        _expect(where, "n_nodes", model.n_nodes, sweep.n_nodes)
+        hash(model.lane_group)
+        signal, second = model.node_pair(state[:, None])
+        _expect(where, "node_pair(rows)[0]", signal.shape, (model.n_nodes, 1))
+        _expect(where, "node_pair(rows)[1]", second.shape, (model.n_nodes, 1))
+        second = model.second_variable(state[:, None], v, np.zeros(1))
+        _expect(where, "second_variable(rows, v0, t)", second.shape, (1, model.n_second))
+        column = np.asarray(model.lane_params, dtype=np.float64)[:, None].copy()
+        rows, slope = state[:, None].copy(), np.zeros((model.n_rows, 1))
+        signatures = getattr(model.right_hand_side, "nopython_signatures", [])
+        if RIGHT_HAND_SIDE not in signatures:
+            raise BadInput(f"{where}: right_hand_side is not compiled as {RIGHT_HAND_SIDE}")
+        model.right_hand_side(rows, slope, column, np.asarray(model.int_params, dtype=np.int64))
+    except BadInput:
+        raise
+    except Exception as error:
+        # Whatever the user's code does.
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        raise BadInput(f"{where} does not work: {text}") from None
+    if not np.isfinite(slope).all():
+        raise BadInput(f"{where}: the right-hand side is not finite in the initial state")
+
+
+def _expect(where: str, what: str, found: Any, wanted: Any) -> None:
+    if found != wanted:
+        raise BadInput(f"{where}: {what} is {found} where {wanted} is needed")
 
 
 def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:

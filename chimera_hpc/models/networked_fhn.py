@@ -123,9 +123,7 @@ class NetworkedFHN:
     def lane_params(self) -> Array:
         """This trajectory's column of parameters, shape (5,)."""
         gain = self.sigma / (2 * self.half_degree)
-        return np.array(
-            [1.0 / self.epsilon, self.b, gain, math.cos(self.phi), math.sin(self.phi)]
-        )
+        return np.array([1.0 / self.epsilon, self.b, gain, math.cos(self.phi), math.sin(self.phi)])
 
     def state(self, u: Array, v: Array) -> Array:
         """Integrated variables of a state given by x and y, both (N0,)."""

@@ -20,7 +20,10 @@ THIRD = 1.0 / 3.0
 
 
 @jit()
-def _node(like: Any, y: Any, dy: Any, params: Any, n: Any, i: Any, total: Any, width: Any, c: Any, rate: Any) -> None:
+def _node(
+    like: Any, y: Any, dy: Any, params: Any, n: Any, i: Any, total: Any, width: Any, c: Any,
+    rate: Any,
+) -> None:  # fmt: skip
     u = load(like, y, i)
     w = load(like, y, n + i)
     store(dy, i, (u - u * u * u * THIRD - w) * rate)
@@ -102,7 +105,8 @@ class TopologicalFHN:
         \dot v_j = b + c v_j + (B_1^\top u)_j
 
     with u on the N0 nodes and v on the N1 = N0 P links. The nodes see the links only through
-    w = B_1 v, and the link equation is linear, so multiplying it by B_1 gives the exact reduced form
+    w = B_1 v, and the link equation is linear, so multiplying it by B_1 gives the exact reduced
+    form
 
     .. math::
         \epsilon \dot u = u - u^3/3 - w, \qquad

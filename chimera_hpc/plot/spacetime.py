@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
@@ -70,6 +71,8 @@ def draw_space_time(axes: Axes, t: ArrayLike, u: ArrayLike, largest: float) -> A
     time = np.asarray(t, dtype=np.float64)
     values = np.asarray(u, dtype=np.float64)
     half = 0.5 * (time[1] - time[0]) if len(time) > 1 else 0.5
+    # Few labels, so that those of neighbouring panels stay apart.
+    axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     return axes.imshow(
         values.T,
         aspect="auto",

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.reduce.classify import Cut
-from chimera_hpc.reduce.naming import NO_WINDOW, STEADY
+from chimera_hpc.reduce.naming import NO_WINDOW as NO_WINDOW
+from chimera_hpc.reduce.naming import STEADY as STEADY
 from chimera_hpc.reduce.tree import Floats, Integers
 from chimera_hpc.status import Status
 

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.reduce.atlas import Atlas, Variable
 from chimera_hpc.reduce.classify import Classification, Cut
-from chimera_hpc.reduce.modes import CellTable, modal_classes
-from chimera_hpc.reduce.naming import NO_WINDOW, STEADY
+from chimera_hpc.reduce.modes import NO_WINDOW, STEADY, CellTable, modal_classes
 from chimera_hpc.reduce.results import TRIPLET
 
 

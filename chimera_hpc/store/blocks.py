@@ -106,9 +106,8 @@ class BlockFiles:
                 if name != "u":
                     reason = self._wrong_size(name, size)
                 else:
-                    index_size = sealed_size(_INDEX_ENTRY * self.shapes["u"][0])
-                    file.seek(max(0, size - index_size))
-                    reason = _wrong_shard(file.read(), index_size, size)
+                    file.seek(max(0, size - self._index_size()))
+                    reason = self._wrong_shard(file.read(), size)
         except FileNotFoundError:
             reason = "missing"
         return Damage(block, name, reason) if reason else None
@@ -137,6 +136,9 @@ class BlockFiles:
         return chunk.to_bytes()
 
     def _decode_series(self, block: int, stored: bytes) -> NDArray[Any]:
+        reason = self._wrong_shard(stored[-self._index_size() :], len(stored))
+        if reason:
+            raise DamagedChunk(Damage(block, "u", reason))
         files: dict[str, Buffer] = {}
         array = create_array(MemoryStore(files), self._series_plan())
         files[self._series_key()] = cpu.Buffer.from_bytes(stored)
@@ -155,13 +157,15 @@ class BlockFiles:
     def _series_key(self) -> str:
         return f"u/{chunk_name(0, len(self.shapes['u']))}"
 
+    def _index_size(self) -> int:
+        return sealed_size(_INDEX_ENTRY * self.shapes["u"][0])
 
-def _wrong_shard(tail: bytes, index_size: int, size: int) -> str:
-    """Say what is wrong with a shard, by the index at its end; empty when nothing is."""
-    data = unseal(tail, index_size - sealed_size(0))
-    if data is None:
-        return "its index is damaged"
-    index = np.frombuffer(data, "<u8").reshape(-1, 2)
-    present = index[index[:, 0] != _ABSENT]
-    end = int(present.sum(axis=1).max(initial=0)) + index_size
-    return "" if end == size else f"{size} bytes instead of {end}"
+    def _wrong_shard(self, tail: bytes, size: int) -> str:
+        """Say what is wrong with a shard, by the index at its end; empty when nothing is."""
+        data = unseal(tail, self._index_size() - sealed_size(0))
+        if data is None:
+            return "its index is damaged"
+        index = np.frombuffer(data, "<u8").reshape(-1, 2)
+        present = index[index[:, 0] != _ABSENT]
+        end = int(present.sum(axis=1).max(initial=0)) + self._index_size()
+        return "" if end == size else f"{size} bytes instead of {end}"

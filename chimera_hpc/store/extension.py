@@ -26,7 +26,8 @@ _EXPIRY = 20.0
 """Seconds after which a change by another machine counts as broken off; it takes one or two."""
 _PATIENCE = 30.0
 """Seconds to wait for others."""
-_SAME_TABLES = ("model", "integrator", "features", "keep")
+SAME_TABLES = ("model", "integrator", "features", "keep")
+"""What the points of one store have in common."""
 
 
 def points_of(sweeps: Sequence[Sweep]) -> Points:
@@ -100,13 +101,13 @@ def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: P
 
 
 def _check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> None:
-    changed = [name for name in _SAME_TABLES if getattr(sweep, name) != getattr(before, name)]
+    changed = [name for name in SAME_TABLES if getattr(sweep, name) != getattr(before, name)]
     if sweep.n_nodes != before.n_nodes:
         changed.append("fixed.n_nodes")
     if changed:
         raise BadInput(f"{path}: an extension may change axes only, not {', '.join(changed)}")
     new = sweep.points()
-    missing = np.flatnonzero(~np.isin(_keys(old), _keys(new, old)))
+    missing = np.flatnonzero(~np.isin(point_keys(old), point_keys(new, old)))
     if len(missing):
         row = ", ".join(f"{name}={value}" for name, value in old.row(int(missing[0])).items())
         raise BadInput(f"{path}: an extension must hold all points of the store, not so {row}")
@@ -115,7 +116,7 @@ def _check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> No
 
 
 def _appended(points: Points, more: Points) -> Points:
-    new = ~np.isin(_keys(more, points), _keys(points))
+    new = ~np.isin(point_keys(more, points), point_keys(points))
     columns = {
         name: np.concatenate([column, more.columns[name][new]])
         for name, column in points.columns.items()
@@ -123,7 +124,7 @@ def _appended(points: Points, more: Points) -> Points:
     return Points(columns, more.axes)
 
 
-def _keys(points: Points, like: Points | None = None) -> NDArray[np.void]:
+def point_keys(points: Points, like: Points | None = None) -> NDArray[np.void]:
     """Return each point as its bytes, in the order of the columns of `like`."""
     # Adding 0 turns -0.0 into 0.0, which is the same parameter.
     rows = [(points.columns[name] + 0).view(np.int64) for name in (like or points).columns]

@@ -41,7 +41,8 @@ def open_sweep(path: str | Path) -> xr.Dataset:
         # Chunks that were written before their ledger chunk could be are no results.
         features = features.where(xr.DataArray(~never, dims="point"))
     for k, (label, unit) in enumerate(_labels(stored["features"])):
-        dataset[label] = features.isel(feature=k).assign_attrs(_attributes(label, unit))
+        dataset[label] = features.isel(feature=k)
+        dataset[label].attrs = _attributes(label, unit)
     tables: dict[str, Mapping[str, NDArray[Any]]] = {"scalars": store.scalars(), "ledger": ledger}
     for name, columns in tables.items():
         for label, unit in _labels(stored[name]):

@@ -18,6 +18,7 @@ from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.layout import BLOCK_ARRAYS, scalar_labels, series_mask
 from chimera_hpc.ledger import (
     FAILED,
+    NO_LIMIT,
     LedgerScan,
     ledger_shape,
     read_block,
@@ -41,7 +42,6 @@ from chimera_hpc.store.write import Receipt, write_block
 if TYPE_CHECKING:
     from chimera_hpc.task import BlockResult
 
-_NO_LIMIT = 2**62
 _FREE_TABLES = ("name", "title", "reduction", "run", "slurm")
 """What a job may change between two runs on one store."""
 
@@ -161,32 +161,38 @@ class Store:
         *,
         attempts: int | None = None,
         statuses: Collection[Status] = FAILED,
+        before: int = NO_LIMIT,
     ) -> list[int]:
         """Return the blocks that have something to do: points that never ran, or damaged chunks.
 
         With `retry_failed` also those with failed points, if `attempts` is given only with points
-        that were tried fewer times; `statuses` limits which failures count.
+        that were tried fewer times; `statuses` and `before` (see `ledger.unfinished`) limit which
+        failures count.
         """
         scan = self.scan()
-        limit = (_NO_LIMIT if attempts is None else attempts) if retry_failed else 0
-        to_do = np.flatnonzero(unfinished(scan.columns, limit, statuses)) // self.block_size
+        limit = (NO_LIMIT if attempts is None else attempts) if retry_failed else 0
+        to_do = np.flatnonzero(unfinished(scan.columns, limit, statuses, before)) // self.block_size
         damaged = {damage.block for damage in find_damaged(self.files, scan)}
         return sorted({*np.unique(to_do).tolist(), *damaged})
 
     def points_to_do(
-        self, i: int, attempts: int = 0, statuses: Collection[Status] = FAILED
+        self,
+        i: int,
+        attempts: int = 0,
+        statuses: Collection[Status] = FAILED,
+        before: int = NO_LIMIT,
     ) -> NDArray[np.int64]:
         """Return which points of block i, counted within it, are to be run.
 
-        These are the points that never ran, those that failed fewer than `attempts` times, and all
-        of them when a chunk of the block is damaged.
+        These are the points that never ran, those that failed fewer than `attempts` times (see
+        `ledger.unfinished`), and all of them when a chunk of the block is damaged.
         """
         start, stop = self.block(i)
         table = read_block(self.path, i, self.block_size)
         if table is None or shallow_damage(self.files, i):
             return np.arange(stop - start)
         columns = table_columns(table[: stop - start])
-        return np.flatnonzero(unfinished(columns, attempts, statuses))
+        return np.flatnonzero(unfinished(columns, attempts, statuses, before))
 
     def find_damaged(self, deep: bool = False, patience: float = 0.0) -> list[Damage]:
         """Return the damaged chunks, by presence and length or, if `deep`, decoding every byte.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from chimera_hpc.files import (
     temporary_name,
     write_atomically,
 )
-from chimera_hpc.grid import Sweep, block_size
+from chimera_hpc.grid import Points, Sweep, block_size
 from chimera_hpc.layout import (
     BLOCK_ARRAYS,
     ArrayPlan,
@@ -39,10 +40,17 @@ REDUCTION = "reduction"
 
 
 def write_template(path: Path, sweep: Sweep) -> None:
-    """Create the store of a sweep; all of it or nothing.
+    """Create the store of a sweep, as `create_whole` does."""
+    points = sweep.points()
+    size = block_size(sweep, len(points))
+    create_whole(path, lambda temporary: build(temporary, [sweep], points, size))
 
-    It is built under a temporary name in the same folder, flushed to the disk and renamed.
-    Raises BadInput when the path exists or cannot be written.
+
+def create_whole(path: Path, make: Callable[[Path], None]) -> None:
+    """Create a store; all of it or nothing.
+
+    `make` builds it under a temporary name in the same folder, then it is flushed to the disk and
+    renamed. Raises BadInput when the path exists or cannot be written.
     """
     if path.exists():
         raise BadInput(f"{path}: exists already, a new store needs a new name")
@@ -50,13 +58,24 @@ def write_template(path: Path, sweep: Sweep) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         remove_leftovers(path.parent)
-        _build(temporary, sweep)
+        make(temporary)
         sync_tree(temporary)
         os.rename(temporary, path)
         sync_folder(path.parent)
     except OSError as error:
         # Where somebody else was faster, the rename fails: his folder is not empty.
         raise BadInput(f"{path}: no store can be made here: {_reason(error)}") from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def build(path: Path, sweeps: Sequence[Sweep], points: Points, size: int) -> None:
+    """Write arrays without chunks, coordinates and root metadata for these points."""
+    zarr.create_group(path)
+    for plan in array_plans(sweeps[-1], points.columns, size):
+        create_array(path, plan)
+    write_coordinates(path, sweeps[-1], points.columns)
+    write_root(path, root_attributes(sweeps, len(points), size))
 
 
 def root_attributes(sweeps: Sequence[Sweep], n_points: int, size: int) -> dict[str, Any]:
@@ -143,17 +162,6 @@ def write_coordinates(path: Path, sweep: Sweep, columns: Mapping[str, NDArray[An
         _array(group, name)[:] = column
     if sweep.keep.series != "none":
         _array(group, "time")[:] = sample_times(sweep)
-
-
-def _build(path: Path, sweep: Sweep) -> None:
-    columns = sweep.points().columns
-    n_points = len(columns["seed"])
-    size = block_size(sweep, n_points)
-    zarr.create_group(path)
-    for plan in array_plans(sweep, columns, size):
-        create_array(path, plan)
-    write_coordinates(path, sweep, columns)
-    write_root(path, root_attributes([sweep], n_points, size))
 
 
 def _reason(error: OSError) -> str:

@@ -186,7 +186,13 @@ def test_a_block_is_chosen_from_the_cost(tables, n_points, size):
 
 @pytest.mark.parametrize(
     ("start", "t_end", "t_step", "n"),
-    [(950.0, 1000.0, 0.01, 5001), (0.0, 1.0, 0.3, 4), (0.5, 1.0, 0.4, 1), (0.1, 0.3, 0.1, 3)],
+    [
+        (950.0, 1000.0, 0.01, 5001),
+        (0.0, 1.0, 0.3, 4),
+        (0.5, 1.0, 0.4, 1),
+        (0.1, 0.3, 0.1, 3),
+        (1.11, 1.13, 0.01, 3),
+    ],
 )
 def test_samples_of_the_analysis_are_multiples_of_the_step(start, t_end, t_step, n):
     spec = sweep(

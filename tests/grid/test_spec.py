@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Sweep
 from chimera_hpc.grid.parameters import MODELS
+from chimera_hpc.grid.reading import apply_overrides
 from chimera_hpc.grid.tables import TABLES
 
 QUICKSTART = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
@@ -29,6 +30,8 @@ def test_the_quickstart_job_states_the_defaults():
     stated, implied = Sweep.load(QUICKSTART).to_dict(), diagonal().to_dict()
     assert stated.pop("name") == "quickstart"
     assert implied.pop("name") == "x"
+    for key in ("show", "replay"):  # the runs of the paper's figures
+        del stated["reduction"][key], implied["reduction"][key]
     assert stated == implied
 
 
@@ -238,6 +241,18 @@ def test_the_integrators_delta_is_not_digested_when_delta_is_an_axis():
 def test_overrides(overrides, table, key, value):
     text = DIAGONAL + "[fixed]\nb = 0.7"
     assert Sweep.from_toml_text(text, overrides).to_dict()[table][key] == value
+
+
+def test_overrides_of_keys_that_the_file_does_not_have():
+    sweep = Sweep.from_toml_text(HEAD, ["P=3", "Q=0:P", "seeds=4"])
+    assert sweep.grid == {"Q": "0:P", "seeds": 4}
+    assert sweep.fixed["P"] == 3
+
+
+def test_overrides_leave_the_data_they_are_put_upon():
+    data = {"grid": {"P": 3}, "fixed": {"b": 1.0}}
+    apply_overrides(data, ["P=4", "b=[1,2]"])
+    assert data == {"grid": {"P": 3}, "fixed": {"b": 1.0}}
 
 
 def test_overrides_of_the_top_keys():

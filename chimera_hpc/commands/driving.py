@@ -1,0 +1,270 @@
+"""Driving a store to its end: the runs of ``run`` and ``retry``, whatever happens on the way."""
+
+from __future__ import annotations
+
+import errno
+import json
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chimera_hpc.claims import live_claims
+from chimera_hpc.commands.stopping import StopRequest
+from chimera_hpc.errors import BadInput
+from chimera_hpc.files import write_atomically
+from chimera_hpc.ledger import unfinished
+from chimera_hpc.processes import process_mark
+from chimera_hpc.progress import Reporter
+from chimera_hpc.provenance import differences, gather
+from chimera_hpc.status import Status
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from chimera_hpc.store import Store
+    from chimera_hpc.work import Again, BlockReceipt, Orders, Trouble
+
+CLUSTERS = ("serial", "local", "scheduler-file")
+_CLUSTER_TRIES = 3
+_BLOCK_TRIES = 3
+"""Errors of the operating system after which a block is put aside."""
+_HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
+"""Errors that the next block would run into as well."""
+_LONGEST_WAIT = 10.0
+_RUNS_COMPARED = 20
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the work is done."""
+
+    kind: str
+    workers: int = 0
+    scheduler_file: Path | None = None
+
+
+class Driver:
+    """Works a store through, and knows afterwards what is in the way of its end."""
+
+    def __init__(
+        self,
+        store: Store,
+        place: Place,
+        stop: StopRequest,
+        log: Path,
+        again: Again,
+        strict: bool = False,
+    ) -> None:
+        self.store, self.place, self.stop = store, place, stop
+        self.again, self.strict, self.log = again, strict, log
+        self.ended_by: str | None = None
+        """What made going on hopeless, on one line."""
+        self.broken: dict[int, Trouble] = {}
+        """Blocks that were put aside, and why."""
+        self._errors: Counter[int] = Counter()
+        self._machines: list[str] = []
+
+    def work(self) -> None:
+        """Do what is left of the store until nothing is left, or to stop."""
+        try:
+            reporter = Reporter(self.store.n_points, self.log)
+        except OSError as error:
+            raise _cannot_write(self.log, error) from None
+        with reporter as self.reporter, self.stop.good_order():
+            self._work()
+
+    def should_stop(self) -> bool:
+        """Return whether somebody asked to stop, or going on has become hopeless."""
+        return self.stop() or self.ended_by is not None
+
+    def pending(self) -> list[int]:
+        """Return the blocks with something to do that were not put aside."""
+        again = self.again
+        blocks = self.store.pending(
+            True, attempts=again.attempts, statuses=again.statuses, before=again.before
+        )
+        return [block for block in blocks if block not in self.broken]
+
+    def _points_left(self) -> int:
+        again = self.again
+        to_do = unfinished(self.store.ledger(), again.attempts, again.statuses, again.before)
+        return int(to_do.sum())
+
+    def _work(self) -> None:
+        store, say = self.store, self.reporter.say
+        try:
+            for line in store.repair():
+                say(line)
+            blocks = self.pending()
+            self.reporter.begin(store.n_points - self._points_left())
+            if not blocks:
+                say("nothing to compute")
+                return
+            orders = self._start(len(blocks))
+        except OSError as error:
+            raise _cannot_write(store.path, error) from None
+        try:
+            if self.place.kind == "serial":
+                self._serial(orders)
+            else:
+                self._on_cluster(orders)
+        finally:
+            _remove(orders.stop_file)
+
+    def _start(self, n_blocks: int) -> Orders:
+        """Record the run, and compile what it needs."""
+        from chimera_hpc.task import warm_up
+        from chimera_hpc.work import Orders
+
+        store, say = self.store, self.reporter.say
+        info = gather()
+        for line in changes(store, info, self.strict):
+            say(line)
+        run = store.start_run({**info, "cluster": self.place.kind})
+        kind = self.place.kind
+        say(f"run {run}: {n_blocks} of {store.n_blocks} blocks to do, {kind}, in {store.path}")
+        began = time.perf_counter()
+        warm_up(store.sweep, store.points)
+        self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
+        self.again = self.again.of_run(run)
+        return Orders(store.path, run, self.again, process_mark())
+
+    def _serial(self, orders: Orders) -> None:
+        from chimera_hpc.execute import run_serial
+
+        for blocks in self._rounds():
+            run_serial(orders, blocks, lambda r: self._note(orders, r), self.should_stop)
+
+    def _on_cluster(self, orders: Orders) -> None:
+        from chimera_hpc.execute import ClusterLost, run_dask
+
+        patience = self.store.sweep.run.patience
+        for attempt in range(_CLUSTER_TRIES):
+            try:
+                with self._cluster(patience) as client:
+                    for blocks in self._rounds():
+                        run_dask(
+                            *(client, orders, blocks, lambda r: self._note(orders, r)),
+                            *(self.should_stop, patience),
+                        )
+                return
+            except ClusterLost as error:
+                self.reporter.say(f"{error}: lost the cluster, {attempt + 1} of {_CLUSTER_TRIES}")
+                if self.stop():
+                    return
+            except BadInput as error:
+                if attempt == 0:
+                    raise
+                self.reporter.say(str(error))
+        self.ended_by = "the cluster was lost again and again"
+
+    def _cluster(self, patience: float) -> AbstractContextManager[Client]:
+        from chimera_hpc.cluster import existing_cluster, local_cluster
+
+        if self.place.scheduler_file is not None:
+            return existing_cluster(self.place.scheduler_file, patience=patience)
+        return local_cluster(self.place.workers, patience=patience)
+
+    def _rounds(self) -> Iterator[list[int]]:
+        """Yield the blocks that are free, again and again, until nothing is left or to stop.
+
+        Blocks in other hands are waited for: their owner may die.
+        """
+        wait = 0.25
+        while not self.should_stop():
+            blocks = self.pending()
+            if not blocks:
+                return
+            others = live_claims(self.store.path)
+            free = [block for block in blocks if block not in others]
+            before = self.reporter.done
+            if free:
+                yield free
+            if self.reporter.done > before:
+                wait = 0.25
+            elif blocks:
+                self._sleep(wait)
+                wait = min(2 * wait, _LONGEST_WAIT)
+
+    def _sleep(self, seconds: float) -> None:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until and not self.should_stop():
+            time.sleep(0.05)
+
+    def _note(self, orders: Orders, receipt: BlockReceipt) -> None:
+        """Take a receipt to the books."""
+        if receipt.machine and receipt.machine not in self._machines:
+            self._machines.append(receipt.machine)
+            record_machines(orders, self._machines)
+        if receipt.trouble is not None:
+            self._note_trouble(receipt.block, receipt.trouble)
+        if not receipt.taken:
+            self.reporter.note(
+                f"block {receipt.block}: {receipt.n_done} done, {receipt.n_failed} failed, "
+                f"{receipt.seconds:.2f} s"
+            )
+            self.reporter.add(receipt.n_done, receipt.n_failed)
+
+    def _note_trouble(self, block: int, trouble: Trouble) -> None:
+        self.reporter.note(f"block {block}: {trouble.trace}")
+        self._errors[block] += 1
+        if trouble.errno in _HOPELESS:
+            self.ended_by = self.ended_by or trouble.text
+        elif trouble.errno is None or self._errors[block] >= _BLOCK_TRIES:
+            self.broken[block] = trouble
+            self.reporter.say(f"block {block} is put aside: {trouble.text}")
+
+
+def changes(store: Store, info: dict[str, Any], strict: bool) -> list[str]:
+    """Return a line for each thing that may change numbers since the results in a store were made.
+
+    Raises
+    ------
+    BadInput
+        When there is any, and `strict` forbids it.
+    """
+    from chimera_hpc.store.runs import read_run
+
+    lines: dict[str, None] = {}
+    for run in runs_of_results(store)[-_RUNS_COMPARED:]:
+        try:
+            before = read_run(store.path, run)
+        except BadInput as error:
+            lines[str(error)] = None
+            continue
+        lines |= dict.fromkeys(f"run {run} had other {line}" for line in differences(before, info))
+    if lines and strict:
+        raise BadInput(f"{store.path}: --strict: " + "; ".join(lines))
+    return [f"warning: {line}; its points stay, marked by their run" for line in lines]
+
+
+def runs_of_results(store: Store) -> list[int]:
+    """Return the numbers of the runs that left results in a store, rising."""
+    ledger = store.ledger()
+    return sorted({int(run) for run in set(ledger["run"][ledger["status"] != Status.NEVER])})
+
+
+def record_machines(orders: Orders, machines: list[str]) -> None:
+    """Write down on which machines a run's points were computed, beside its record."""
+    path = orders.stop_file.with_suffix(".machines.json")
+    try:
+        write_atomically(path, json.dumps(machines, indent=1).encode())
+    except OSError:
+        # A disk that is full will be heard of from the blocks.
+        return
+
+
+def _cannot_write(path: Path, error: OSError) -> BadInput:
+    where = error.filename or path
+    return BadInput(f"{where}: can't be written: {error.strerror or error}")
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return

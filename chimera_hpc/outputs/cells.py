@@ -1,0 +1,87 @@
+"""Which axes of a sweep are free, and how points and cells are called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+SYMBOLS = {
+    "epsilon": r"\epsilon",
+    "sigma": r"\sigma",
+    "phi": r"\varphi",
+    "delta": r"\delta",
+    "flips": "Q_r",
+}
+"""How parameters are written in figures, where it is not their name."""
+
+
+class FreeAxis(NamedTuple):
+    """Parameters that vary together, such as P and Q where Q = P, and their value in each cell."""
+
+    names: tuple[str, ...]
+    values: NDArray[Any]
+    """(n_cells,)"""
+
+    @property
+    def plain(self) -> str:
+        """The axis in text: ``P = Q``."""
+        return " = ".join(self.names)
+
+    @property
+    def symbol(self) -> str:
+        """The axis in a figure: ``$P = Q$``."""
+        return f"${' = '.join(map(_symbol, self.names))}$"
+
+
+def free_axes(cells: Mapping[str, NDArray[Any]], axes: Sequence[str]) -> list[FreeAxis]:
+    """Return the axes that vary and don't follow from those before them.
+
+    `cells` holds a column (n_cells,) for each parameter, `axes` are the names to look at. A column
+    that equals an earlier one joins it; one that is another function of the earlier ones is left
+    out.
+    """
+    free: list[FreeAxis] = []
+    for name in axes:
+        column = cells.get(name)
+        if column is None or len(column) == 0 or bool((column == column[0]).all()):
+            continue
+        twin = next((i for i, f in enumerate(free) if np.array_equal(f.values, column)), None)
+        if twin is not None:
+            free[twin] = FreeAxis((*free[twin].names, name), free[twin].values)
+        elif _count([*(f.values for f in free), column]) > _count([f.values for f in free]):
+            free.append(FreeAxis((name,), column))
+    return free
+
+
+def describe(row: Mapping[str, int | float], axes: Sequence[FreeAxis], math: bool = False) -> str:
+    """Return where a point lies: ``P = Q = 9``, or ``P = 9, Q = 3`` where they differ."""
+    parts = []
+    for axis in axes:
+        equal = len({row[name] for name in axis.names}) == 1
+        for names in [axis.names] if equal else [(name,) for name in axis.names]:
+            value = number(row[names[0]])
+            words = [_symbol(name) if math else name for name in names]
+            text = " = ".join([*words, value])
+            parts.append(f"${text}$" if math else text)
+    return ", ".join(parts)
+
+
+def number(value: float) -> str:
+    """Write a parameter for people: integers as they are, others in four digits."""
+    return str(value) if isinstance(value, int | np.integer) else f"{value:.4g}"
+
+
+def _count(columns: Sequence[NDArray[Any]]) -> int:
+    """Return the number of different rows."""
+    if not columns:
+        return 1
+    codes = np.stack([np.unique(column, return_inverse=True)[1] for column in columns], axis=1)
+    return len(np.unique(codes, axis=0))
+
+
+def _symbol(name: str) -> str:
+    plain = rf"\mathrm{{{name}}}" if len(name) > 1 else name
+    return SYMBOLS.get(name, plain)
