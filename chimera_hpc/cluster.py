@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 LOOPBACK = "127.0.0.1"
+_WARNINGS = "PYTHONWARNINGS"
 
 ONE_THREAD = {
     name: "1"
@@ -87,6 +88,7 @@ def local_cluster(
 
     with (
         dask.config.set(settings(patience)),
+        _quiet_tracker(),
         LocalCluster(
             n_workers=workers or usable_cores(),
             threads_per_worker=1,
@@ -120,9 +122,7 @@ def existing_cluster(scheduler_file: Path, *, patience: float = 60.0) -> Iterato
     import dask
 
     if not scheduler_file.is_file():
-        raise BadInput(
-            f"{scheduler_file}: no such file; dask scheduler --scheduler-file makes it"
-        )
+        raise BadInput(f"{scheduler_file}: no such file; dask scheduler --scheduler-file makes it")
     with dask.config.set(settings(patience)), _connected(scheduler_file, patience) as client:
         _prepare(client)
         yield client
@@ -141,6 +141,23 @@ def _connected(scheduler_file: Path, patience: float) -> Client:
                 text = f"{scheduler_file}: its scheduler does not answer: {error}"
                 raise BadInput(text) from None
             time.sleep(0.5)
+
+
+@contextmanager
+def _quiet_tracker() -> Iterator[None]:
+    """Keep Python from telling at the end about the semaphores of workers that were killed.
+
+    They are cleaned up all the same, by a process that takes its orders from the environment.
+    """
+    before = os.environ.get(_WARNINGS)
+    os.environ[_WARNINGS] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_WARNINGS]
+        else:
+            os.environ[_WARNINGS] = before
 
 
 def _prepare(client: Client) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import queue
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from chimera_hpc.work import BlockReceipt, Orders, do_block
@@ -23,6 +23,8 @@ ShouldStop = Callable[[], bool]
 WINDOW = 3
 """Blocks submitted to the scheduler at a time, for each worker: enough that none waits, few enough
 that the scheduler's memory does not grow with the sweep."""
+NO_WORKER_SECONDS = 90.0
+"""Time without any worker after which the cluster is given up: new ones take a while to start."""
 _LOOK_SECONDS = 0.5
 _COUNT_SECONDS = 2.0
 """How often the workers are counted."""
@@ -33,7 +35,7 @@ class ClusterLost(RuntimeError):
 
 
 def run_serial(
-    orders: Orders, blocks: Sequence[int], on_receipt: OnReceipt, should_stop: ShouldStop
+    orders: Orders, blocks: Iterable[int], on_receipt: OnReceipt, should_stop: ShouldStop
 ) -> None:
     """Do the blocks one after the other in this process."""
     for block in blocks:
@@ -45,10 +47,11 @@ def run_serial(
 def run_dask(
     client: Client,
     orders: Orders,
-    blocks: Sequence[int],
+    blocks: Iterable[int],
     on_receipt: OnReceipt,
     should_stop: ShouldStop,
     patience: float = 60.0,
+    may_come: Callable[[], bool] = lambda: False,
 ) -> None:
     """Do the blocks on a Dask cluster, a bounded window of them at a time.
 
@@ -64,24 +67,32 @@ def run_dask(
         Asked twice a second. When true, the workers are told through the orders' stop file, and
         what they have done so far is waited for.
     patience : float
-        Seconds without any worker, or of waiting for one that was told to stop, after which the
-        cluster is given up.
+        Seconds of waiting for workers that were told to stop.
+    may_come : callable
+        Whether workers that are not there yet may still come, as from the queue of a batch system:
+        then they are waited for.
 
     Raises
     ------
     ClusterLost
-        When the scheduler went away, or there was no worker for `patience` seconds.
+        When the scheduler went away, or there was no worker for `NO_WORKER_SECONDS`.
     """
-    _Window(client, orders, blocks, patience).run(on_receipt, should_stop)
+    _Window(client, orders, blocks, patience, may_come).run(on_receipt, should_stop)
 
 
 class _Window:
     """The blocks in flight, and how the cluster is."""
 
     def __init__(
-        self, client: Client, orders: Orders, blocks: Sequence[int], patience: float
+        self,
+        client: Client,
+        orders: Orders,
+        blocks: Iterable[int],
+        patience: float,
+        may_come: Callable[[], bool],
     ) -> None:
         self.client, self.orders, self.patience = client, orders, patience
+        self.may_come = may_come
         self.waiting: Iterator[int] = iter(blocks)
         self.flying: dict[Future[BlockReceipt], int] = {}
         self.landed: queue.SimpleQueue[Future[BlockReceipt]] = queue.SimpleQueue()
@@ -160,10 +171,10 @@ class _Window:
             return
         self.counted = now
         self.workers = self.count_workers()
-        if self.workers:
+        if self.workers or self.may_come():
             self.seen = now
-        elif now - self.seen > self.patience:
-            raise ClusterLost(f"no worker for {self.patience:.0f} s")
+        elif now - self.seen > NO_WORKER_SECONDS:
+            raise ClusterLost(f"no worker for {NO_WORKER_SECONDS:.0f} s")
 
     def count_workers(self) -> int:
         """Return the number of workers; 0 while the scheduler cannot be asked."""

@@ -8,7 +8,7 @@ one line in `FIGURES` or `CUT_FIGURES`; and its name in `grid.selection`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from chimera_hpc.curve_figures import CURVE_FIGURES
 from chimera_hpc.features import FEATURES as LABELS
 from chimera_hpc.grid.selection import split_figure_name
 from chimera_hpc.plot.classification import (
@@ -76,6 +77,10 @@ class Outcome:
     """Label and value in each cell (n_cells,) of what varies between cells."""
     cells: Mapping[int, Sequence[Mapping[str, Any]]]
     """For each cut its cells (n_cells,) with ``class`` and ``votes``."""
+    curves: Mapping[str, Any] = field(default_factory=dict)
+    """What analyses made, as in results.json."""
+    beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """``curves`` of the sweeps that are drawn with this one, by their names."""
     shown: Sequence[Run] = ()
     """Runs over the analysis interval."""
     whole: Sequence[Run] = ()
@@ -155,6 +160,7 @@ FIGURES: dict[str, Maker] = {
     "space_time": draw_space_time,
     "indicators": draw_indicators,
     "whole_run": draw_whole_run,
+    **CURVE_FIGURES,
 }
 CUT_FIGURES: dict[str, CutMaker] = {
     "dendrogram": draw_dendrogram,

@@ -33,7 +33,7 @@ SEPARATOR = "."
 METADATA = "zarr.json"
 """Root metadata, with the attributes and the metadata of all arrays."""
 METADATA_COPY = "zarr.json.copy"
-"""The same with its crc32c behind it."""
+"""The same, with the crc32c of the metadata that it replaced and one of all that behind it."""
 _CHECKSUM_BYTES = 4
 
 
@@ -51,8 +51,7 @@ class LedgerScan:
 
 def seal(data: bytes) -> bytes:
     """Return the data followed by its crc32c, as Zarr's codec `crc32c` stores it."""
-    checksum: int = google_crc32c.value(data)
-    return data + checksum.to_bytes(_CHECKSUM_BYTES, "little")
+    return data + _checksum(data)
 
 
 def unseal(sealed: bytes, size: int) -> bytes | None:
@@ -60,8 +59,7 @@ def unseal(sealed: bytes, size: int) -> bytes | None:
     if len(sealed) != size + _CHECKSUM_BYTES:
         return None
     data = sealed[:size]
-    checksum = int.from_bytes(sealed[size:], "little")
-    return data if google_crc32c.value(data) == checksum else None
+    return data if _checksum(data) == sealed[size:] else None
 
 
 def sealed_size(size: int) -> int:
@@ -77,14 +75,17 @@ def chunk_name(block: int, n_dimensions: int) -> str:
 def read_metadata(store: Path) -> dict[str, Any]:
     """Return the root metadata of a store, consolidated metadata of its arrays included.
 
-    Where the file is damaged, its copy is read instead. Raises BadInput when the path is not a
-    store of ours.
+    Where the file is not as it was written, its copy is read instead. Raises BadInput when the path
+    is not a store of ours.
     """
     store = Path(store)
     if not store.is_dir():
         raise BadInput(f"{store}: not a sweep's store: no such folder")
     try:
-        root = _parse(_bytes(store / METADATA)) or read_copy(store)
+        data = _bytes(store / METADATA)
+        copy, trusted = _copy(store)
+        root = _parse(data) if copy is None or _checksum(data) in trusted else None
+        root = root or copy or _parse(data)
     except OSError as error:
         raise BadInput(f"{store}: not a sweep's store: {METADATA}: {error.strerror}") from None
     if root is None:
@@ -94,8 +95,24 @@ def read_metadata(store: Path) -> dict[str, Any]:
 
 def read_copy(store: Path) -> dict[str, Any] | None:
     """Return the root metadata from their checksummed copy; None where that is no use."""
+    return _copy(store)[0]
+
+
+def metadata_copy(data: bytes, before: bytes) -> bytes:
+    """Return the contents of `METADATA_COPY` for root metadata that replace those of `before`.
+
+    It is written first. So the file of the root metadata is sound when it is what the copy says, or
+    what was there before: then the write was broken off.
+    """
+    return seal(data + _checksum(before))
+
+
+def _copy(store: Path) -> tuple[dict[str, Any] | None, tuple[bytes, ...]]:
+    """Return the root metadata by their copy, and the checksums that their file may have."""
     sealed = _bytes(store / METADATA_COPY)
-    return _parse(unseal(sealed, len(sealed) - _CHECKSUM_BYTES) or b"")
+    whole = unseal(sealed, len(sealed) - _CHECKSUM_BYTES) or b""
+    data, before = whole[:-_CHECKSUM_BYTES], whole[-_CHECKSUM_BYTES:]
+    return _parse(data), (_checksum(data), before)
 
 
 def ledger_shape(metadata: Mapping[str, Any]) -> tuple[int, int]:
@@ -182,6 +199,11 @@ def digests(features: ArrayLike, scalars: ArrayLike) -> NDArray[np.int64]:
 def point_digest(features: ArrayLike, scalars: ArrayLike) -> int:
     """Return the digest of one point: features (features, nodes), scalars (quantities,)."""
     return int(digests(np.asarray(features)[np.newaxis], np.asarray(scalars)[np.newaxis])[0])
+
+
+def _checksum(data: bytes) -> bytes:
+    checksum: int = google_crc32c.value(data)
+    return checksum.to_bytes(_CHECKSUM_BYTES, "little")
 
 
 def _bytes(path: Path) -> bytes:

@@ -23,9 +23,10 @@ class Reporter:
     def __init__(self, total: int, log: Path | None = None, stream: TextIO | None = None) -> None:
         """Count up to ``total`` points; ``log`` gets a copy of every line."""
         self.total, self.done, self.failed = total, 0, 0
-        self._at_start = 0
-        self._began = time.monotonic()
-        self._last_line = self._began
+        self._counted = 0
+        # The clock of the rate starts with the first block: workers take a while to come up.
+        self._began: float | None = None
+        self._last_line = time.monotonic()
         self._stream = stream or sys.stderr
         self._log = log.open("a", encoding="utf-8") if log is not None else None
         self._bar: Progress | None = None
@@ -74,10 +75,9 @@ class Reporter:
                 self._log.close()
             self._log = None
 
-    def begin(self, done: int) -> None:
-        """Begin to measure the rate, with ``done`` points there already."""
-        self.done = self._at_start = done
-        self._began = time.monotonic()
+    def count(self, done: int, failed: int) -> None:
+        """Take over the number of points that need nothing more, and of those that failed."""
+        self.done, self.failed = done, failed
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=done)
 
@@ -99,17 +99,20 @@ class Reporter:
                 self._log.write(f"{stamp} {line}\n")
                 self._log.flush()
 
-    def add(self, n_done: int, n_failed: int) -> None:
-        """Count the points of a block that has ended."""
+    def add(self, n_done: int, n_failed: int, seconds: float = 0.0) -> None:
+        """Count the points of a block that has ended after `seconds` of work."""
+        now = time.monotonic()
+        if self._began is None:
+            self._began = now - seconds
         self.done += n_done + n_failed
         self.failed += n_failed
-        elapsed = time.monotonic() - self._began
-        rate = (self.done - self._at_start) / max(elapsed, 1e-9)
+        self._counted += n_done + n_failed
+        rate = self._counted / max(now - self._began, 1e-9)
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self.done, rate=f"{rate:.1f}/s")
-        elif time.monotonic() - self._last_line > LINE_SECONDS or self.done >= self.total:
-            self._last_line = time.monotonic()
-            left = (self.total - self.done) / max(rate, 1e-9)
+        elif now - self._last_line > LINE_SECONDS or self.done >= self.total:
+            self._last_line = now
+            left = max(0, self.total - self.done) / max(rate, 1e-9)
             failures = f", {self.failed} failed" if self.failed else ""
             self.say(
                 f"{self.done} of {self.total} points{failures}, {rate:.1f} points/s, "

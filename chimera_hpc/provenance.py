@@ -18,6 +18,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from chimera_hpc import __version__
+
 PACKAGE = Path(__file__).parent
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "zarr", "dask", "distributed", "scikit-learn")
 _SLURM = (
@@ -41,7 +43,7 @@ def gather() -> dict[str, Any]:
     command, folder, started (UTC), slurm (those of its variables that are set).
     """
     return {
-        "package": {"name": PACKAGE.name, "version": _version_of(PACKAGE.name)},
+        "package": {"name": PACKAGE.name, "version": __version__},
         "source": source_digest(),
         "git": git_state(PACKAGE.parent),
         "python": platform.python_version(),

@@ -103,7 +103,7 @@ def simulate(
     Raises
     ------
     BadInput
-        Wrong shapes, values that are not finite, times or tolerances out of range.
+        Wrong shapes, values that are not finite, numbers out of range, unknown form or method.
 
     Examples
     --------
@@ -123,16 +123,8 @@ def simulate(
         model = system
     first = _vector("u0", u0, model.n_nodes)
     second = _vector("v0", v0, model.n_second)
-    if not (0.0 <= t_start <= t_end and t_end > 0.0 and t_step > 0.0 and math.isfinite(t_end)):
-        raise BadInput(
-            f"t_start = {t_start}, t_end = {t_end}, t_step = {t_step}: "
-            "0 <= t_start <= t_end, t_end > 0 and t_step > 0 are needed"
-        )
-    if not (rtol > 0.0 and atol > 0.0):
-        raise BadInput(f"rtol = {rtol}, atol = {atol}: both must be above 0")
-    if method not in METHODS:
-        raise BadInput(f"method = {method!r}: allowed are {', '.join(METHODS)}")
     control = Control(t_end, t_start, t_step, rtol, atol, method, max_steps, time_out)
+    _check(control)
     ends: list[tuple[Outcome, Array]] = []
     integrate(
         [model],
@@ -146,6 +138,25 @@ def simulate(
     rows[:, end.n_sampled :] = np.nan
     u, w = model.node_pair(rows)
     return Trajectory(times, u.T, w.T, end.status, end.steps, rows, second, model)
+
+
+def _check(control: Control) -> None:
+    t_start, t_end, t_step = control.start, control.t_end, control.step
+    finite = math.isfinite(t_end) and math.isfinite(t_step)
+    if not (finite and 0.0 <= t_start <= t_end and t_end > 0.0 and t_step > 0.0):
+        raise BadInput(
+            f"t_start = {t_start}, t_end = {t_end}, t_step = {t_step}: finite numbers with "
+            "0 <= t_start <= t_end, t_end > 0 and t_step > 0 are needed"
+        )
+    if not (control.rtol > 0.0 and control.atol > 0.0):
+        raise BadInput(f"rtol = {control.rtol}, atol = {control.atol}: both must be above 0")
+    if control.method not in METHODS:
+        raise BadInput(f"method = {control.method!r}: allowed are {', '.join(METHODS)}")
+    if not (control.max_steps >= 1 and control.time_out > 0.0):
+        raise BadInput(
+            f"max_steps = {control.max_steps}, time_out = {control.time_out}: "
+            "at least 1, and above 0, are needed"
+        )
 
 
 def _vector(name: str, values: ArrayLike, size: int) -> Array:

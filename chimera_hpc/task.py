@@ -49,7 +49,7 @@ class BlockResult:
     features : shape (n, 8, N0)
         Along axis 1 `features.FEATURES`; NaN unless the point is DONE.
     scalars : shape (n, n_scalars)
-        Along axis 1 `layout.scalar_labels`.
+        Along axis 1 `layout.scalar_labels`; like the features, of u as it is stored (`rounded`).
     steps, elapsed_us, n_windows : shape (n,)
         Accepted steps, share of the wall time in microseconds, Fourier windows.
     series : shape (n, T, N0) or None
@@ -94,9 +94,8 @@ def run_block(
     with suppress(Stopped):
         for rows in _lane_groups(block.models):
             factor = 1.0
-            for _ in range(sweep.run.attempts):
-                block.integrate(rows, factor, should_stop, on_point, lanes)
-                rows = [row for row in rows if block.result.status[row] in _RETRIED]
+            for left in reversed(range(sweep.run.attempts)):
+                rows = block.integrate(rows, factor, left > 0, should_stop, on_point, lanes)
                 factor *= sweep.run.tighten
     return block.result
 
@@ -132,6 +131,19 @@ def _lane_groups(models: list[Model]) -> Iterator[list[int]]:
     yield from groups.values()
 
 
+def rounded(u: Array, dtype: str) -> Array:
+    """Return a signal as a store of this type gives it back, beyond the range of int16 too.
+
+    What is measured is what is stored: a maximum between two nearly equal samples would otherwise
+    move to the other one, and its window with it, when the features are computed anew from the
+    store.
+    """
+    if dtype == "int16":
+        steps: Array = np.rint(u / SCALE)
+        return steps * SCALE
+    return u.astype(dtype).astype(np.float64)
+
+
 class _Block:
     """Models, initial states and the result that the runs fill."""
 
@@ -150,12 +162,14 @@ class _Block:
         self,
         rows: list[int],
         factor: float,
+        may_retry: bool,
         should_stop: Callable[[], bool] | None,
         on_point: Callable[[int, Status], None] | None,
         lanes: int | None,
-    ) -> None:
+    ) -> list[int]:
+        """Run the points ``rows``; return those to be tried again, which count as not reached."""
         if not rows:
-            return
+            return []
         spec = self.sweep.integrator
         control = Control(
             t_end=spec.t_end,
@@ -168,26 +182,33 @@ class _Block:
             time_out=spec.time_out,
         )
         models = [self.models[row] for row in rows]
+        again: list[int] = []
 
         def on_end(number: int, outcome: Outcome) -> None:
-            self.measure(rows[number], outcome)
+            row = rows[number]
+            self.result.steps[row] += outcome.steps
+            self.result.elapsed_us[row] += int(1e6 * outcome.elapsed)
+            if may_retry and outcome.status in _RETRIED:
+                again.append(row)
+                return
+            self.measure(row, outcome)
             if on_point is not None:
-                on_point(rows[number], Status(self.result.status[rows[number]]))
+                on_point(row, Status(self.result.status[row]))
 
         def state(number: int) -> Array:
             return models[number].state(*self.initial[rows[number]])
 
         n_rows = max(model.n_rows for model in models)
         integrate(models, state, control, n_rows, on_end, should_stop, lanes)
+        return again
 
     def measure(self, row: int, outcome: Outcome) -> None:
         result, model = self.result, self.models[row]
-        result.steps[row] += outcome.steps
-        result.elapsed_us[row] += int(1e6 * outcome.elapsed)
         result.status[row] = outcome.status
         if outcome.status is not Status.DONE:
             return
         u, w = model.node_pair(outcome.samples)
+        u = rounded(u, self.sweep.keep.dtype)
         features = self.features(u)
         result.status[row] = features.status
         result.n_windows[row] = features.n_windows

@@ -9,7 +9,7 @@ import os
 import socket
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
@@ -22,6 +22,7 @@ from chimera_hpc.claims import Claim, ClaimLost, LostAttempt, claim_block, forge
 from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.ledger import METADATA, NO_LIMIT
 from chimera_hpc.provenance import cpu_model
+from chimera_hpc.slurm import walltime
 from chimera_hpc.status import Status
 from chimera_hpc.store import Store
 from chimera_hpc.task import BlockResult, failed_block, run_block
@@ -104,6 +105,8 @@ class BlockReceipt:
     """Somebody else was at it."""
     stopped: bool = False
     """The run was told to stop before the block was whole."""
+    late: bool = False
+    """It was not begun, or not ended: too little is left of the batch job's time."""
     trouble: Trouble | None = None
     machine: str = ""
     """Where it was computed."""
@@ -120,7 +123,7 @@ class StopSignal:
 
     def __call__(self) -> bool:
         """Return whether the run is to stop."""
-        if self.local is not None and self.local():
+        if walltime.time_to_leave() or (self.local is not None and self.local()):
             return True
         now = time.monotonic()
         if now - self._looked > _STOP_LOOK_SECONDS:
@@ -153,10 +156,22 @@ def do_block(
     return BlockReceipt(block, trouble=trouble, machine=_machine())
 
 
+def hand_back_all() -> None:
+    """Give up the claims in hand at once: this process is being ended, not by its work."""
+    for claim in _in_hand:
+        with suppress(OSError):
+            claim.hand_back()
+
+
 def blame_memory() -> None:
     """Leave word at the blocks in hand that this process is being ended for its use of memory."""
     for claim in _in_hand:
         claim.blame_memory()
+
+
+def is_busy() -> bool:
+    """Return whether this process holds any claim."""
+    return bool(_in_hand)
 
 
 _in_hand: list[Claim] = []
@@ -175,6 +190,10 @@ class _Block:
 
     def do(self) -> BlockReceipt:
         began = time.perf_counter()
+        hours = walltime.this_job()
+        if hours is not None and not hours.fits(self.store, self._rows_to_do()):
+            walltime.leave_if_worker()
+            return BlockReceipt(self.block, stopped=True, late=True)
         with self._claimed(self.block) as claim:
             whole = self._work(claim)
             if whole and claim.lost:
@@ -186,9 +205,16 @@ class _Block:
             self.n_failed,
             time.perf_counter() - began,
             stopped=not whole and self.trouble is None,
+            late=not whole and walltime.time_to_leave(),
             trouble=self.trouble,
             machine=_machine(),
         )
+
+    def _rows_to_do(self) -> Rows:
+        """Return which points of the store are to be done, as far as one sees without a claim."""
+        again = self.orders.again
+        rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
+        return self.store.block(self.block)[0] + rows
 
     @contextmanager
     def _claimed(self, name: int | str) -> Iterator[Claim]:
@@ -212,15 +238,14 @@ class _Block:
         """Do what is to do; return whether all of it was done."""
         again = self.orders.again
         rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
-        deaths = self._deaths(claim)
-        alone = len(deaths) >= LOSSES_BEFORE_SPLIT or any(d.out_of_memory for d in deaths)
+        together, alone = _tries_together(self._deaths(claim))
         groups = _pieces(rows, 1 if alone else max(1, len(rows)))
         while groups:
             group = groups.pop(0)
             if alone:
-                result, tries = self._compute_alone(claim, group, len(deaths))
+                result, tries = self._compute_alone(claim, group, together)
             else:
-                result, tries = self._compute(group, claim), 1 + len(deaths)
+                result, tries = self._compute(group, claim), together + 1
             if result is None:
                 groups = _pieces(group, -(-len(group) // 2)) + groups
                 continue
@@ -258,12 +283,12 @@ class _Block:
             return failed_block(self.sweep, points, Status.NEVER)
 
     def _compute_alone(
-        self, claim: Claim, rows: Rows, deaths_before: int
+        self, claim: Claim, rows: Rows, before: int
     ) -> tuple[BlockResult | None, int]:
         """Compute one point under a claim of its own, so that a lost worker is known to be its."""
         with self._claimed(f"{self.block}_{rows[0]}") as own:
             deaths = self._deaths(own)
-            tries = min(deaths_before, LOSSES_BEFORE_SPLIT) + len(deaths)
+            tries = before + len(deaths)
             if len(deaths) < self.sweep.run.attempts:
                 result = self._compute(rows, claim, own)
                 tries += 1
@@ -292,6 +317,14 @@ class _Block:
         process, note = lost.info.get("process"), lost.info.get("note")
         was_driver = isinstance(note, dict) and note.get("driver") == process
         return was_driver or lost.info.get("run") == self.orders.run
+
+
+def _tries_together(deaths: Sequence[LostAttempt]) -> tuple[int, bool]:
+    """Return how many attempts were made on the whole block, and whether no more of them are."""
+    for count, death in enumerate(deaths, start=1):
+        if count == LOSSES_BEFORE_SPLIT or death.out_of_memory:
+            return count, True
+    return len(deaths), False
 
 
 def _end(claim: Claim, whole: bool) -> None:

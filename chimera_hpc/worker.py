@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from distributed import WorkerPlugin
 
+from chimera_hpc.slurm.walltime import WORKER, leaving, time_to_leave
+
 if TYPE_CHECKING:
     from distributed import Worker
 
 _MEMORY = Path("/proc/self/statm")
+_LEAVE_SECONDS = 1.5
+"""Time for a block to be given up in good order when a batch system ends the worker."""
 _NEARLY = 0.9
 """Share of the memory limit from which an end is put down to the use of memory; Dask ends a
 worker at 0.95 of it."""
@@ -38,11 +43,41 @@ class Manners(WorkerPlugin):
                 from chimera_hpc.work import blame_memory
 
                 blame_memory()
+            elif "SLURM_JOB_ID" in os.environ:
+                # A cancelled, preempted or requeued job, or its time limit.
+                _drop_work()
             signal.signal(number, signal.SIG_DFL)
             os.kill(os.getpid(), number)
 
         _on(signal.SIGINT, signal.SIG_IGN)
+        if WORKER in os.environ:
+            _leave_in_time(worker)
         _on(signal.SIGTERM, end)
+
+
+def _drop_work() -> None:
+    """Let the block in hand be given up in good order, for a short while; then give it up."""
+    from chimera_hpc.work import hand_back_all, is_busy
+
+    leaving.set()
+    until = time.monotonic() + _LEAVE_SECONDS
+    while is_busy() and time.monotonic() < until:
+        time.sleep(0.02)
+    hand_back_all()
+
+
+def _leave_in_time(worker: Worker) -> None:
+    """Close the worker when its job's time is over, or when it was told to leave."""
+    from tornado.ioloop import PeriodicCallback
+
+    async def look() -> None:
+        if time_to_leave():
+            leaving.set()
+            watch.stop()
+            await worker.close_gracefully()
+
+    watch = PeriodicCallback(look, 500)
+    worker.loop.add_callback(watch.start)
 
 
 def resident_bytes() -> int:

@@ -140,9 +140,36 @@ def test_random_links_are_different_and_reproducible(count, seed):
     np.testing.assert_array_equal(turned.links, ring.reorient_random(count, generator).links)
 
 
+@given(rings())
+def test_links_at_a_node_are_those_that_touch_it_nearest_first(topology):
+    n, half = topology.n_nodes, topology.half_degree
+    for node in (0, n // 2, n - 1):
+        at = topology.links_at(node)
+        touching = np.flatnonzero((topology.links == node).any(axis=1))
+        assert sorted(at) == touching.tolist()
+        ends = [set(link) - {node} for link in topology.links[at].tolist()]
+        ahead = [{(node + k) % n} for k in range(1, half + 1)]
+        behind = [{(node - k) % n} for k in range(1, half + 1)]
+        assert ends == ahead + behind
+        nearest = topology.links_at(node, 1)
+        assert nearest.tolist() == [at[0], at[half]]
+
+
+@given(st.integers(0, 6), st.integers(0, 2**32))
+def test_random_links_may_be_drawn_from_some(count, seed):
+    ring = Topology.ring(16, 3)
+    among = ring.links_at(5)
+    turned = ring.reorient_random(count, seed, among)
+    changed = np.flatnonzero((turned.links != ring.links).any(axis=1))
+    assert len(changed) == count
+    assert set(changed) <= set(among)
+
+
 def test_random_links_are_uniform():
     ring = Topology.ring(10, 2)
-    turned = [(ring.reorient_random(5, seed).links != ring.links).any(axis=1) for seed in range(800)]
+    turned = [
+        (ring.reorient_random(5, seed).links != ring.links).any(axis=1) for seed in range(800)
+    ]
     hits = np.sum(turned, axis=0)
     # 800 draws of 5 out of 20: mean 200, standard deviation 12.2
     assert np.abs(hits - 200).max() < 5 * 12.2
@@ -153,7 +180,8 @@ def test_random_links_are_uniform():
 def test_reorienting_leaves_the_ring_it_started_from_alone(topology):
     before = topology.links.copy()
     s = topology.divergence.copy()
-    topology.reorient_node(0, topology.half_degree).reorient_random(topology.n_links).divergence
+    turned = topology.reorient_node(0, topology.half_degree).reorient_random(topology.n_links)
+    assert turned.divergence is not s
     np.testing.assert_array_equal(topology.links, before)
     np.testing.assert_array_equal(topology.divergence, s)
 
@@ -173,6 +201,10 @@ def test_reorienting_leaves_the_ring_it_started_from_alone(topology):
         (lambda: Topology.ring(8, 3).reorient_node(-1, 1), "node = -1: allowed is 0 to 7"),
         (lambda: Topology.ring(8, 3).reorient_random(25), "flips = 25: allowed is 0 to the 24"),
         (lambda: Topology.ring(8, 3).reorient_random(-1), "flips = -1: allowed is 0 to the 24"),
+        (
+            lambda: Topology.ring(8, 3).reorient_random(7, 0, Topology.ring(8, 3).links_at(0)),
+            "flips = 7: allowed is 0 to the 6 links to draw from",
+        ),
     ],
 )
 def test_what_is_not_possible_is_refused_in_one_line(make, message):

@@ -10,7 +10,21 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Protocol
 
-from chimera_hpc.commands import plan, reduce, run, status
+from chimera_hpc.commands import (
+    cancel,
+    export,
+    extend,
+    merge,
+    plan,
+    reduce,
+    retry,
+    run,
+    shard,
+    slurm,
+    status,
+    verify,
+    why,
+)
 
 
 class Command(Protocol):
@@ -24,4 +38,8 @@ class Command(Protocol):
     def execute(self, args: Namespace) -> int: ...
 
 
-COMMANDS: tuple[Command, ...] = (run, plan, status, reduce)
+COMMANDS: tuple[Command, ...] = (
+    *(run, plan, status, reduce),
+    *(retry, why, verify, extend, merge, export),
+    *(slurm, shard, cancel),
+)

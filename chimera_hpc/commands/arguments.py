@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from chimera_hpc.commands.driving import CLUSTERS, Place
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Sweep
+from chimera_hpc.grid.parameters import DELTA, SEED, parameters_of, short
+from chimera_hpc.grid.selection import parse_selection
+from chimera_hpc.grid.tables import Slurm
+
+if TYPE_CHECKING:
+    from chimera_hpc.store import Store
 
 STORE = "store.zarr"
+_SIZE = re.compile(r"[1-9][0-9]{0,9}([kMGT]i?)?B", re.ASCII)
 
 
 def add_job(parser: ArgumentParser) -> None:
@@ -55,6 +64,30 @@ def add_folder(parser: ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="DIR", help="the sweep's folder")
 
 
+def add_point(parser: ArgumentParser) -> None:
+    """Add the selection of points by their values."""
+    parser.add_argument("point", nargs="+", metavar="NAME=VALUE", help="such as P=3 Q=5 seed=7")
+
+
+def find_points(store: Store, words: Sequence[str]) -> list[int]:
+    """Return the points of a store that words such as ``P=3 seed=7`` select.
+
+    Raises
+    ------
+    BadInput
+        For an unknown name, a value that is none, or when there is no such point.
+    """
+    from chimera_hpc.outputs.selection import find_points as find
+
+    text = " ".join(words)
+    table = parameters_of(store.sweep.model)
+    values = parse_selection(text, "point", {p.name: p for p in (*table.parameters, DELTA, SEED)})
+    found = find(store.points, values)
+    if not len(found):
+        raise BadInput(f"point: {short(text)}: there is no such point in {store.path}")
+    return [int(i) for i in found]
+
+
 def add_place(parser: ArgumentParser) -> None:
     """Add where the work is done."""
     parser.add_argument(
@@ -62,13 +95,50 @@ def add_place(parser: ArgumentParser) -> None:
         default="local",
         choices=CLUSTERS,
         help="serial: this process; local: worker processes here (default); "
-        "scheduler-file: a Dask cluster that is running already",
+        "scheduler-file: a Dask cluster that is running already; slurm: worker jobs that this "
+        "process submits; allocation: the tasks of the SLURM job that this process is in",
     )
     parser.add_argument(
         "--scheduler-file", type=Path, metavar="FILE", help="file that its scheduler wrote"
     )
     parser.add_argument(
         "--workers", type=int, metavar="N", help="worker processes (default: one a core)"
+    )
+    parser.add_argument(
+        "--memory",
+        metavar="SIZE",
+        help="memory at which a local worker is ended, e.g. 2GB (default: a fair share)",
+    )
+
+
+def add_slurm(parser: ArgumentParser) -> None:
+    """Add what is asked of SLURM; each overrides the job's table [slurm]."""
+    group = parser.add_argument_group("SLURM", "override the table [slurm] of the job")
+    group.add_argument("--partition", metavar="NAME", help="partition of the jobs")
+    group.add_argument("--account", metavar="NAME", help="account that they are charged to")
+    group.add_argument("--time", metavar="LIMIT", help="time limit of a job, e.g. 30 or 1-12:00:00")
+    group.add_argument("--mem", metavar="SIZE", help="memory of a worker, e.g. 800M or 2G")
+    group.add_argument("--interface", metavar="NAME", help="network of scheduler and workers")
+
+
+def add_resubmit(parser: ArgumentParser) -> None:
+    """Add going on after the time limit."""
+    parser.add_argument(
+        "--resubmit",
+        type=int,
+        default=0,
+        metavar="N",
+        help="go on up to N times, as the same SLURM job, when its time limit stopped it",
+    )
+
+
+def add_reduction(parser: ArgumentParser) -> None:
+    """Add how a run ends, and whether it may begin."""
+    parser.add_argument("--no-figures", action="store_true", help="results.json, but no figures")
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse to go on with other code, libraries or processors than the results there have",
     )
 
 
@@ -78,7 +148,18 @@ def place_of(args: Namespace, sweep: Sweep) -> Place:
         raise BadInput(f"--workers {args.workers}: allowed is 1 or more")
     if (args.cluster == "scheduler-file") != (args.scheduler_file is not None):
         raise BadInput("--cluster scheduler-file and --scheduler-file FILE go together")
-    return Place(args.cluster, args.workers or sweep.run.workers, args.scheduler_file)
+    if args.memory is not None and not _SIZE.fullmatch(args.memory):
+        raise BadInput(f"--memory {args.memory}: a size such as 800MB or 2GB is needed")
+    workers = args.workers or sweep.run.workers
+    wishes = slurm_wishes(args, sweep) if args.cluster in ("slurm", "allocation") else None
+    return Place(args.cluster, workers, args.scheduler_file, args.memory, wishes)
+
+
+def slurm_wishes(args: Namespace, sweep: Sweep) -> Slurm:
+    """Return what the user's file, the job and the arguments ask of SLURM."""
+    from chimera_hpc.slurm.options import wishes
+
+    return wishes(sweep.slurm, vars(args))
 
 
 def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> Sweep:

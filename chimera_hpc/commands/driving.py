@@ -6,8 +6,8 @@ import errno
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,19 +16,21 @@ from chimera_hpc.claims import live_claims
 from chimera_hpc.commands.stopping import StopRequest
 from chimera_hpc.errors import BadInput
 from chimera_hpc.files import write_atomically
-from chimera_hpc.ledger import unfinished
+from chimera_hpc.ledger import RESULTS, unfinished
 from chimera_hpc.processes import process_mark
 from chimera_hpc.progress import Reporter
 from chimera_hpc.provenance import differences, gather
+from chimera_hpc.slurm.walltime import NEAR, time_to_leave
 from chimera_hpc.status import Status
 
 if TYPE_CHECKING:
     from distributed import Client
 
+    from chimera_hpc.grid.tables import Slurm
     from chimera_hpc.store import Store
     from chimera_hpc.work import Again, BlockReceipt, Orders, Trouble
 
-CLUSTERS = ("serial", "local", "scheduler-file")
+CLUSTERS = ("serial", "local", "scheduler-file", "slurm", "allocation")
 _CLUSTER_TRIES = 3
 _BLOCK_TRIES = 3
 """Errors of the operating system after which a block is put aside."""
@@ -45,6 +47,12 @@ class Place:
     kind: str
     workers: int = 0
     scheduler_file: Path | None = None
+    memory: str | None = None
+    """Limit a worker, as `800MB`."""
+    wishes: Slurm | None = None
+    """What is asked of SLURM."""
+    share: tuple[int, int] | None = None
+    """Which share of the blocks, of how many: block i belongs to share i modulo their number."""
 
 
 class Driver:
@@ -67,6 +75,8 @@ class Driver:
         """Blocks that were put aside, and why."""
         self._errors: Counter[int] = Counter()
         self._machines: list[str] = []
+        self._late = False
+        self._may_come: Callable[[], bool] = lambda: False
 
     def work(self) -> None:
         """Do what is left of the store until nothing is left, or to stop."""
@@ -79,6 +89,8 @@ class Driver:
 
     def should_stop(self) -> bool:
         """Return whether somebody asked to stop, or going on has become hopeless."""
+        if self.ended_by is None and time_to_leave():
+            self.ended_by = NEAR
         return self.stop() or self.ended_by is not None
 
     def pending(self) -> list[int]:
@@ -87,12 +99,15 @@ class Driver:
         blocks = self.store.pending(
             True, attempts=again.attempts, statuses=again.statuses, before=again.before
         )
-        return [block for block in blocks if block not in self.broken]
+        index, count = self.place.share or (0, 1)
+        return [b for b in blocks if b not in self.broken and b % count == index]
 
-    def _points_left(self) -> int:
-        again = self.again
-        to_do = unfinished(self.store.ledger(), again.attempts, again.statuses, again.before)
-        return int(to_do.sum())
+    def _count(self) -> None:
+        """Have the reporter count what the ledger says, whoever did it."""
+        again, ledger = self.again, self.store.ledger()
+        to_do = unfinished(ledger, again.attempts, again.statuses, again.before)
+        failed = ~to_do & (ledger["status"] > max(RESULTS))
+        self.reporter.count(int((~to_do).sum()), int(failed.sum()))
 
     def _work(self) -> None:
         store, say = self.store, self.reporter.say
@@ -100,7 +115,7 @@ class Driver:
             for line in store.repair():
                 say(line)
             blocks = self.pending()
-            self.reporter.begin(store.n_points - self._points_left())
+            self._count()
             if not blocks:
                 say("nothing to compute")
                 return
@@ -137,7 +152,9 @@ class Driver:
         from chimera_hpc.execute import run_serial
 
         for blocks in self._rounds():
-            run_serial(orders, blocks, lambda r: self._note(orders, r), self.should_stop)
+            run_serial(
+                *(orders, self._in_time(blocks), lambda r: self._note(orders, r)), self.should_stop
+            )
 
     def _on_cluster(self, orders: Orders) -> None:
         from chimera_hpc.execute import ClusterLost, run_dask
@@ -148,8 +165,9 @@ class Driver:
                 with self._cluster(patience) as client:
                     for blocks in self._rounds():
                         run_dask(
-                            *(client, orders, blocks, lambda r: self._note(orders, r)),
-                            *(self.should_stop, patience),
+                            *(client, orders, self._in_time(blocks)),
+                            *(lambda r: self._note(orders, r), self.should_stop),
+                            *(patience, lambda: self._may_come()),
                         )
                 return
             except ClusterLost as error:
@@ -162,12 +180,38 @@ class Driver:
                 self.reporter.say(str(error))
         self.ended_by = "the cluster was lost again and again"
 
-    def _cluster(self, patience: float) -> AbstractContextManager[Client]:
+    @contextmanager
+    def _cluster(self, patience: float) -> Iterator[Client]:
+        place, say = self.place, self.reporter.say
         from chimera_hpc.cluster import existing_cluster, local_cluster
 
-        if self.place.scheduler_file is not None:
-            return existing_cluster(self.place.scheduler_file, patience=patience)
-        return local_cluster(self.place.workers, patience=patience)
+        if place.kind == "slurm" and place.wishes is not None:
+            from chimera_hpc.slurm.workers import slurm_cluster
+
+            blocks = len(self.pending())
+            with slurm_cluster(place.wishes, self.store.path, blocks, say, patience) as both:
+                client, keeper = both
+                self._may_come = keeper.coming
+                yield client
+        elif place.kind == "allocation" and place.wishes is not None:
+            from chimera_hpc.slurm.allocation import allocation_cluster
+
+            with allocation_cluster(place.wishes, self.store.path, say, patience) as client:
+                yield client
+        elif place.scheduler_file is not None:
+            with existing_cluster(place.scheduler_file, patience=patience) as client:
+                yield client
+        else:
+            memory = place.memory or "auto"
+            with local_cluster(place.workers, patience=patience, memory_limit=memory) as client:
+                yield client
+
+    def _in_time(self, blocks: list[int]) -> Iterator[int]:
+        """Yield blocks as long as none has turned out to be too long for the job's time."""
+        for block in blocks:
+            if self._late:
+                return
+            yield block
 
     def _rounds(self) -> Iterator[list[int]]:
         """Yield the blocks that are free, again and again, until nothing is left or to stop.
@@ -179,11 +223,15 @@ class Driver:
             blocks = self.pending()
             if not blocks:
                 return
+            self._count()
             others = live_claims(self.store.path)
             free = [block for block in blocks if block not in others]
             before = self.reporter.done
             if free:
                 yield free
+            if self._late:
+                self.ended_by = self.ended_by or NEAR
+                return
             if self.reporter.done > before:
                 wait = 0.25
             elif blocks:
@@ -202,12 +250,14 @@ class Driver:
             record_machines(orders, self._machines)
         if receipt.trouble is not None:
             self._note_trouble(receipt.block, receipt.trouble)
+        # A worker that is a job of its own is followed by another one.
+        self._late |= receipt.late and self.place.kind != "slurm"
         if not receipt.taken:
             self.reporter.note(
                 f"block {receipt.block}: {receipt.n_done} done, {receipt.n_failed} failed, "
                 f"{receipt.seconds:.2f} s"
             )
-            self.reporter.add(receipt.n_done, receipt.n_failed)
+            self.reporter.add(receipt.n_done, receipt.n_failed, receipt.seconds)
 
     def _note_trouble(self, block: int, trouble: Trouble) -> None:
         self.reporter.note(f"block {block}: {trouble.trace}")

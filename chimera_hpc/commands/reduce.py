@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from chimera_hpc.commands.arguments import add_folder, store_path
+from chimera_hpc.commands.arguments import STORE, add_folder, store_path
 from chimera_hpc.commands.exits import Exit
 from chimera_hpc.errors import BadInput
+from chimera_hpc.ledger import read_ledger
+from chimera_hpc.status import Status
 
 NAME = "reduce"
 HELP = "make results.json, figures and the report from what is in the store"
@@ -19,11 +21,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_folder(parser)
     parser.add_argument("--no-figures", action="store_true", help="results.json only")
+    parser.add_argument(
+        "--complete", action="store_true", help="only if every point was tried; else exit status 75"
+    )
 
 
 def execute(args: Namespace) -> int:
     """Reduce the sweep in a folder, finished or not."""
     folder = store_path(args.folder).parent
+    if args.complete:
+        left = int((read_ledger(folder / STORE)["status"] == Status.NEVER).sum())
+        if left:
+            print(f"{folder}: {left} points are left to compute; nothing reduced")
+            return Exit.MORE_TO_DO
     from chimera_hpc.outputs import reduce_sweep
     from chimera_hpc.store import DamagedChunk
 

@@ -12,6 +12,9 @@ from chimera_hpc.commands.arguments import (
     add_job,
     add_out,
     add_place,
+    add_reduction,
+    add_resubmit,
+    add_slurm,
     add_yes,
     load_job,
     place_of,
@@ -20,6 +23,7 @@ from chimera_hpc.commands.arguments import (
 from chimera_hpc.commands.driving import Driver
 from chimera_hpc.commands.ending import end, interrupted
 from chimera_hpc.commands.estimate import estimate, refuse_absurd
+from chimera_hpc.commands.resubmitting import go_on
 from chimera_hpc.commands.stopping import stop_request
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Sweep
@@ -44,13 +48,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_job(parser)
     add_out(parser)
     add_place(parser)
+    add_slurm(parser)
+    add_resubmit(parser)
     add_block(parser)
-    parser.add_argument("--no-figures", action="store_true", help="results.json, but no figures")
-    parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="refuse to go on with other code, libraries or processors than the results there have",
-    )
+    add_reduction(parser)
     add_yes(parser)
 
 
@@ -67,7 +68,7 @@ def execute(args: Namespace) -> int:
             again = Again(attempts=sweep.run.attempts)
             driver = Driver(store, place, stop, folder / "run.log", again, args.strict)
             driver.work()
-            return end(driver, folder, args)
+            return go_on(end(driver, folder, args), driver, args.resubmit)
         except KeyboardInterrupt:
             return interrupted(stop, args)
 

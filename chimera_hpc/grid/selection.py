@@ -3,14 +3,45 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from chimera_hpc.errors import BadInput
-from chimera_hpc.grid.parameters import DELTA, MODELS, SEED, nearest, short
+from chimera_hpc.grid.parameters import DELTA, MODELS, SEED, Parameter, nearest, short
 
 FIGURES = ("space_time", "indicators", "whole_run")
 """Names of the figures of a sweep, drawn by `chimera_hpc.figures`."""
+CURVE_FIGURES = (
+    "networks",
+    "stability",
+    "basin",
+    "atlas",
+    "robustness",
+    "incoherence",
+    "incoherence_delta",
+    "sigma_l",
+    "agreement",
+    "verdicts",
+    "reconstruction",
+    "synthetic_signal",
+    "spectrum",
+)
+"""Names of the figures of analyses."""
+ANALYSES = (
+    "networks",
+    "stability",
+    "basin",
+    "oscillation",
+    "variations",
+    "atlas",
+    "robustness",
+    "incoherence",
+    "sigma-l",
+    "agreement",
+    "synthetic",
+    "spectrum",
+)
+"""Names of the analyses, made by `chimera_hpc.analyses`."""
 CUT_FIGURES = ("dendrogram", "projections", "modal_classes", "classification")
 """Names of the figures of one cut; the number of clusters may follow, as in dendrogram_3."""
 
@@ -21,7 +52,9 @@ _INTEGER = re.compile(r"[-+]?[0-9]{1,30}")
 _NUMBERED = re.compile(r"([a-z_]+)_([1-9][0-9]{0,8})")
 
 
-def parse_selection(text: str, key: str = "selection") -> dict[str, int | float]:
+def parse_selection(
+    text: str, key: str = "selection", known: Mapping[str, Parameter] = _PARAMETERS
+) -> dict[str, int | float]:
     """Return the values by name of a text such as ``P=9 Q=9 seed=0``.
 
     `key` begins the message of the BadInput for anything else: words that are not NAME=NUMBER,
@@ -33,13 +66,13 @@ def parse_selection(text: str, key: str = "selection") -> dict[str, int | float]
         name, _, number = word.partition("=")
         if not _WORD.fullmatch(word):
             raise BadInput(f"{where}: {_EXAMPLE}")
-        if name not in _PARAMETERS:
-            raise BadInput(f"{where}: unknown {short(name)}{nearest(name, list(_PARAMETERS))}")
+        if name not in known:
+            raise BadInput(f"{where}: unknown {short(name)}{nearest(name, list(known))}")
         if name in values:
             raise BadInput(f"{where}: {name} is given twice")
         try:
             value = int(number) if _INTEGER.fullmatch(number) else float(number)
-            values[name] = _PARAMETERS[name].check(value)
+            values[name] = known[name].check(value)
         except ValueError as error:
             raise BadInput(f"{where}: {name}: {error}") from None
     if not values:
@@ -71,7 +104,7 @@ def check_figures(value: Any) -> Any:
     """Pass "auto", or return a tuple of known names of figures; BadInput for others."""
     if value == "auto":
         return value
-    names, known = _texts(value), [*FIGURES, *CUT_FIGURES]
+    names, known = _texts(value), [*FIGURES, *CURVE_FIGURES, *CUT_FIGURES]
     if names is None:
         text = f'{short(value)} is neither "auto" nor a list of names; known: {", ".join(known)}'
         raise BadInput(f"reduction.figures: {text}")
@@ -79,6 +112,18 @@ def check_figures(value: Any) -> Any:
         if not (name in known or split_figure_name(name)[0] in CUT_FIGURES):
             hint = nearest(name, known)
             raise BadInput(f"reduction.figures: {short(name)} is not a figure{hint}")
+    return names
+
+
+def check_analyses(value: Any) -> tuple[str, ...]:
+    """Return a tuple of known names of analyses; BadInput for others."""
+    names = _texts(value)
+    if names is None:
+        raise BadInput(f"reduction.analyses: {short(value)} is not a list of names")
+    for name in names:
+        if name not in ANALYSES:
+            hint = nearest(name, list(ANALYSES))
+            raise BadInput(f"reduction.analyses: {short(name)} is not an analysis{hint}")
     return names
 
 

@@ -16,12 +16,17 @@ from pydantic import (
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid.parameters import METHODS, nearest, short
-from chimera_hpc.grid.selection import check_figures, check_selections
+from chimera_hpc.grid.selection import check_analyses, check_figures, check_selections
 
 
 def _as_tuple(value: Any) -> Any:
     """Take a list (TOML, JSON) for a tuple: a frozen value holds no list."""
     return tuple(value) if isinstance(value, list) else value
+
+
+def _as_words(value: Any) -> Any:
+    """Take one name for a tuple of it."""
+    return (value,) if isinstance(value, str) else _as_tuple(value)
 
 
 def _names(value: Any) -> Any:
@@ -172,6 +177,23 @@ class Reduction(Table):
     )
     figures: Annotated[str | Texts, BeforeValidator(check_figures)] = Field(
         "auto", description='"auto", all that fit, or a list of the names of figures.'
+    )
+    analyses: Annotated[Texts, BeforeValidator(check_analyses)] = Field(
+        (), description="What else is made of the points, for results.json: names of analyses."
+    )
+    atlas: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
+        (),
+        description="Sweeps whose classes judge the runs: folders beside this one, or paths. The "
+        "first judges, the others are the check.",
+    )
+    beside: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
+        (), description="Sweeps whose curves are drawn with this one's: folders beside this one."
+    )
+    deltas: Annotated[tuple[Annotated[float, Field(ge=0)], ...], BeforeValidator(_as_tuple)] = (
+        Field((), description="Thresholds of the strength of incoherence.")
+    )
+    delta_unit: Literal["range", "absolute"] = Field(
+        "range", description="Unit of deltas: the range of u of each run, or the unit of u."
     )
 
     @model_validator(mode="after")

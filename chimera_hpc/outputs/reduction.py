@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chimera_hpc.files import remove_leftovers, temporary_name, write_atomically
+from chimera_hpc.layout import sample_times
 from chimera_hpc.outputs.cells import FreeAxis, free_axes
 from chimera_hpc.outputs.selection import check_selections
 from chimera_hpc.outputs.table import class_table
+from chimera_hpc.reduce.atlas import Atlas, Variable
 from chimera_hpc.reduce.classify import Classification, classify
 from chimera_hpc.reduce.modes import run_names
 from chimera_hpc.reduce.record import reduction_variables
@@ -102,12 +104,14 @@ class _Work:
         self.notes: list[str] = []
         self.ledger = store.ledger()
         self.status = self.ledger["status"]
-        scalars = store.scalars()
-        self.triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
+        self.scalars = store.scalars()
+        self.triplets = np.stack([self.scalars[name] for name in TRIPLET], axis=1)
         axes = [name for name in store.points.axes if name != "seed"]
         self.axes: list[FreeAxis] = free_axes(store.points.cells()[1], axes)
         self.classification: Classification
         self.results: dict[str, Any] = {}
+        self.curves: dict[str, Any] = {}
+        self.atlases: dict[str, Atlas] = {}
         self.table = ""
 
     def note(self, line: str) -> None:
@@ -127,14 +131,57 @@ class _Work:
             names=spec.names,
         )
         self.classification = made
-        self.results = build_results(store.sweep, store.points, self.ledger, made, curves, claims)
-        store.write_reduction(*reduction_variables(store.points, self.status, made))
+        self.curves = {**self._analyses(), **(curves or {})}
+        self.results = build_results(
+            store.sweep, store.points, self.ledger, made, self.curves, claims
+        )
+        self.curves = self.results["curves"]
+        store.write_reduction(*self._variables())
         write_atomically(self.folder / RESULTS, to_json(self.results).encode())
         self._say(_coverage(self.results["points"]))
         self._explain_missing_classes()
         self.table = class_table(
             {str(k): self.results["cuts"][str(k)]["cells"] for k in self.cuts}, self.axes
         )
+
+    def _analyses(self) -> dict[str, Any]:
+        """Make what ``reduction.analyses`` asks for."""
+        store, spec = self.store, self.store.sweep.reduction
+        if not spec.analyses and not spec.atlas:
+            return {}
+        from chimera_hpc.analyses import Given, analyse
+        from chimera_hpc.outputs.atlases import atlases_of
+        from chimera_hpc.outputs.runs import series_of
+
+        self.atlases = atlases_of(self.folder, spec.atlas, self.note)
+        given = Given(
+            sweep=store.sweep,
+            points=store.points,
+            status=self.status,
+            scalars=self.scalars,
+            classification=self.classification,
+            cut=self.classification.cuts[self.cuts[0]],
+            atlases=self.atlases,
+            series=lambda i: (sample_times(store.sweep), series_of(store, i)),
+        )
+        return analyse(given, self.note)
+
+    def _variables(self) -> tuple[dict[str, Variable], dict[str, Any]]:
+        """What the store keeps: the classes, and the atlases that judged with their verdicts."""
+        variables, attributes = reduction_variables(
+            self.store.points, self.status, self.classification
+        )
+        for number, (name, atlas) in enumerate(self.atlases.items()):
+            arrays, names = atlas.variables()
+            judged = atlas.classify(self.triplets)
+            variables |= {
+                f"judge_{number}_{key}": (tuple(f"judge_{number}_{d}" for d in dimensions), values)
+                for key, (dimensions, values) in arrays.items()
+            }
+            variables[f"judge_{number}_labels"] = (("point",), judged.label)
+            variables[f"judge_{number}_distance"] = (("point",), judged.distance)
+            attributes[f"judge_{number}"] = {"sweep": name, **names}
+        return variables, attributes
 
     @property
     def cuts(self) -> list[int]:
@@ -172,17 +219,20 @@ class _Work:
 
     def _outcome(self, names: Mapping[str, object]) -> Outcome:
         from chimera_hpc.figures import Outcome
+        from chimera_hpc.outputs.atlases import curves_beside
         from chimera_hpc.outputs.runs import shown_runs, whole_runs
 
         store, made = self.store, self.classification
         first = made.cuts[self.cuts[0]]
         runs = run_names(first.labels, self.status, first.names)
-        needs_runs = {"space_time", "indicators"} & set(names)
+        needs_runs = {"space_time", "indicators", "incoherence"} & set(names)
         return Outcome(
             classification=made,
             triplets=self.triplets,
             axes=[(axis.symbol, axis.values) for axis in self.axes],
             cells={k: self.results["cuts"][str(k)]["cells"] for k in self.cuts},
+            curves=self.curves,
+            beside=curves_beside(self.folder, store.sweep.reduction.beside, self.note),
             shown=shown_runs(store, self.status, self.triplets, first, runs, self.axes, self.note)
             if needs_runs
             else (),

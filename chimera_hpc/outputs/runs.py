@@ -87,12 +87,15 @@ def _load(store: Store, i: int, class_name: str, triplet: Array, axes: Sequence[
     if oscillates:
         block, row = divmod(i, store.block_size)
         features = np.array(store.files.read("features", block)[row])
-    if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
-        u = store.series(i)
-    else:
-        u, _ = _integrate(store.sweep, store.points[i : i + 1])
-    t = sample_times(store.sweep)
+    t, u = sample_times(store.sweep), series_of(store, i)
     return Run(place, t, u, class_name, features, triplet if oscillates else None)
+
+
+def series_of(store: Store, i: int) -> Array:
+    """Return the series (T, N) of a point; it is computed again where it is not kept."""
+    if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
+        return store.series(i)
+    return _integrate(store.sweep, store.points[i : i + 1])[0]
 
 
 def _place(row: Mapping[str, int | float], axes: Sequence[FreeAxis]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Points, Sweep
@@ -29,15 +30,20 @@ def check_selections(sweep: Sweep, points: Points) -> None:
         single_point(sweep, points.row(0), text)
 
 
-def find_point(points: Points, values: Mapping[str, int | float]) -> int | None:
-    """Return the first point with these values, None when there is none.
+def find_points(points: Points, values: Mapping[str, int | float]) -> NDArray[np.int64]:
+    """Return the points with these values, as far as nine digits.
 
-    They need to agree in nine digits only: 0.015 finds what a linspace made.
+    0.015 finds what a linspace made.
     """
     fits = np.ones(len(points), dtype=bool)
     for name, value in values.items():
         fits &= np.isclose(points.columns[name], value, rtol=1e-9, atol=0.0)
-    found = np.flatnonzero(fits)
+    return np.flatnonzero(fits)
+
+
+def find_point(points: Points, values: Mapping[str, int | float]) -> int | None:
+    """Return the first point with these values, None when there is none; see `find_points`."""
+    found = find_points(points, values)
     return int(found[0]) if len(found) else None
 
 

@@ -68,3 +68,43 @@ def _draw_strength(axes: Axes, panel: Strengths, label: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(integer=bool(np.all(x == np.rint(x))), nbins=7))
     axes.set_xlabel(label)
     axes.set_title(panel.title)
+
+
+@style.styled
+def incoherence_sensitivity(
+    x: ArrayLike, delta: ArrayLike, strength: ArrayLike, marks: Sequence[float], *, label: str
+) -> Figure:
+    """Draw the mean SI (k, d) over a parameter x (k,) and the threshold delta (d,), as a map.
+
+    `marks` are thresholds that stand as lines: how fast the colour changes across a line is how
+    much the verdict hangs on the threshold.
+    """
+    figure = style.new_figure(style.COLUMN + 1.4, 3.0)
+    axes = figure.subplots()
+    mesh = axes.pcolormesh(
+        np.asarray(x, float),
+        np.asarray(delta, float),
+        np.ma.masked_invalid(np.asarray(strength, float).T),
+        shading="nearest",
+        vmin=0.0,
+        vmax=1.0,
+        cmap="viridis",
+        rasterized=True,
+    )
+    for i, mark in enumerate(sorted(marks, reverse=True)):
+        axes.axhline(mark, color=style.RED, linewidth=0.9, linestyle="--")
+        axes.annotate(
+            f"{mark:g}",
+            (1.0, mark),
+            xycoords=("axes fraction", "data"),
+            xytext=(3, 2 if i == 0 else -2),
+            textcoords="offset points",
+            va="bottom" if i == 0 else "top",
+            color=style.RED,
+            fontsize=6.5,
+        )
+    axes.set_yscale("log")
+    axes.set_xlabel(label)
+    axes.set_ylabel(r"threshold $\delta$ / range of $u$")
+    figure.colorbar(mesh, ax=axes, label="mean SI")
+    return figure

@@ -67,14 +67,15 @@ def extend(path: Path, sweeps: Sequence[Sweep], sweep: Sweep, block_size: int) -
     old = points_of(sweeps)
     _check_extension(path, sweeps[-1], old, sweep)
     new = points_of([*sweeps, sweep])
-    for folder in (*new.columns, *BLOCK_ARRAYS):
+    stored = _stored_columns(path, new)
+    for folder in (*stored, *BLOCK_ARRAYS):
         file = path / folder / METADATA
         if file.exists():
             node = json.loads(file.read_bytes())
             node["shape"][0] = len(new)
             write_atomically(file, json.dumps(node, indent=1).encode())
-    write_coordinates(path, sweep, new.columns)
-    for name in new.columns:
+    write_coordinates(path, sweep, stored)
+    for name in stored:
         sync_tree(path / name)
     write_root(path, root_attributes([*sweeps, sweep], len(new), block_size))
 
@@ -94,10 +95,16 @@ def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: P
         if own is not None and name.partition("/")[0] != REDUCTION and _json(file) != own:
             write_atomically(file, json.dumps(own, indent=1).encode())
             done.append(f"{name}/{METADATA} written anew")
-    if not _coordinates_hold(path, points):
-        write_coordinates(path, sweep, points.columns)
+    known = set(root["consolidated_metadata"]["metadata"])
+    broken_off = [file for name in known for file in (path / name).glob("c.*.partial")]
+    for file in broken_off:
+        # Zarr's own temporary files; only one process at a time writes coordinates.
+        file.unlink(missing_ok=True)
+    columns = {name: column for name, column in points.columns.items() if name in known}
+    if not _coordinates_hold(path, columns):
+        write_coordinates(path, sweep, columns)
         done.append("coordinates written anew")
-    return done
+    return done + ([f"{len(broken_off)} temporary files removed"] if broken_off else [])
 
 
 def _check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> None:
@@ -133,12 +140,25 @@ def point_keys(points: Points, like: Points | None = None) -> NDArray[np.void]:
     return keys
 
 
-def _coordinates_hold(path: Path, points: Points) -> bool:
+def _stored_columns(path: Path, points: Points) -> dict[str, NDArray[Any]]:
+    """Return the columns that the store has; a later version of a model may know more.
+
+    Raises BadInput when the points differ in one that the store has not.
+    """
+    missing = [name for name in points.columns if not (path / name / METADATA).exists()]
+    for name in missing:
+        column = points.columns[name]
+        if (column != column[0]).any():
+            text = f"it was planned by an earlier version, which had no parameter {name}"
+            raise BadInput(f"{path}: cannot be extended in {name}: {text}")
+    return {name: column for name, column in points.columns.items() if name not in missing}
+
+
+def _coordinates_hold(path: Path, columns: Mapping[str, NDArray[Any]]) -> bool:
     try:
         group = zarr.open_group(path, mode="r")
         return all(
-            np.array_equal(np.asarray(group[name]), column)
-            for name, column in points.columns.items()
+            np.array_equal(np.asarray(group[name]), column) for name, column in columns.items()
         )
     except Exception:
         # However it fails, they cannot be read.

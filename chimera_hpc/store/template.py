@@ -23,6 +23,7 @@ from chimera_hpc.files import (
     write_atomically,
 )
 from chimera_hpc.grid import Points, Sweep, block_size
+from chimera_hpc.grid.spec import spec_digest
 from chimera_hpc.layout import (
     BLOCK_ARRAYS,
     ArrayPlan,
@@ -30,7 +31,7 @@ from chimera_hpc.layout import (
     block_plans,
     sample_times,
 )
-from chimera_hpc.ledger import METADATA, METADATA_COPY, SEPARATOR, read_metadata, seal
+from chimera_hpc.ledger import METADATA, METADATA_COPY, SEPARATOR, metadata_copy, read_metadata
 from chimera_hpc.streams import STREAM_TAG
 
 SCHEMA = 1
@@ -119,7 +120,7 @@ def check_root(path: Path, root: Mapping[str, Any]) -> Sweep:
     attributes, nodes = root["attributes"], root["consolidated_metadata"]["metadata"]
     sweep = Sweep.from_dict(attributes["spec"], where=str(path))
     specs = attributes.get("specs")
-    if sweep.digest != attributes["digest"] or not isinstance(specs, list) or not specs:
+    if _digest(attributes) != attributes["digest"] or not isinstance(specs, list) or not specs:
         raise BadInput(f"{path}: the attributes spec, specs and digest do not belong together")
     for spec in specs:
         Sweep.from_dict(spec, where=str(path))
@@ -168,6 +169,14 @@ def _reason(error: OSError) -> str:
     return f"{error.strerror} ({error.filename})" if error.filename else str(error.strerror)
 
 
+def _digest(attributes: Mapping[str, Any]) -> str | None:
+    """Return the digest of the spec as it is stored; None where it lacks a table."""
+    try:
+        return spec_digest(attributes["spec"])
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+
+
 def _matches(node: Any, plan: ArrayPlan) -> bool:
     try:
         chunks = node["chunk_grid"]["configuration"]["chunk_shape"]
@@ -203,7 +212,7 @@ def _write_root(path: Path, attributes: Mapping[str, Any], nodes: Mapping[str, A
 
     They are what `zarr.consolidate_metadata` makes, which would look into `runs` and `claims` too:
     these are no part of the Zarr hierarchy. A checksummed copy is written first, from which a
-    damaged root is restored.
+    damaged root is found out and restored.
     """
     root = {
         "attributes": dict(attributes),
@@ -212,8 +221,10 @@ def _write_root(path: Path, attributes: Mapping[str, Any], nodes: Mapping[str, A
         "node_type": "group",
     }
     data = json.dumps(root, indent=1).encode()
-    write_atomically(path / METADATA_COPY, seal(data))
-    write_atomically(path / METADATA, data)
+    file = path / METADATA
+    before = file.read_bytes() if file.exists() else b""
+    write_atomically(path / METADATA_COPY, metadata_copy(data, before))
+    write_atomically(file, data)
 
 
 def _consolidated(nodes: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kernel_tools import run_all
 from hypothesis import given
 from hypothesis import strategies as st
+from kernel_tools import run_all
 
 from chimera_hpc.integrate import kernel as K
 from chimera_hpc.integrate.driver import Control, Lanes

@@ -158,8 +158,8 @@ def test_no_other_number_of_lanes_is_compiled():
         K.advance(4)
 
 
-@given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 5))
-def test_state_begins_on_a_cache_line(rows, lanes, _):
+@given(st.integers(1, 40), st.integers(1, 40))
+def test_state_begins_on_a_cache_line(rows, lanes):
     array = aligned(rows, lanes)
     assert array.shape == (rows, lanes)
     assert array.ctypes.data % 64 == 0

@@ -167,7 +167,7 @@ def test_cache_folder_that_cannot_be_made_is_replaced(tmp_path, monkeypatch):
 def test_folder_of_other_users_of_numba_is_left_as_it_was(own_cache):
     before = numba.config.CACHE_DIR
     assert jit()(lambda x: x)(3) == 3
-    assert numba.config.CACHE_DIR == before
+    assert before == numba.config.CACHE_DIR
     assert list(own_cache.rglob("*.nbc"))
 
 

@@ -125,6 +125,12 @@ def test_class_map_colours_every_cell(rendered: Render, colour_at: Any) -> None:
     assert labels == ["ordered", "chimera", "disordered-2", "steady"]
 
 
+def test_legend_of_many_classes_fits_a_narrow_figure(rendered: Render) -> None:
+    classes = ["ordered-1", "ordered-2", "chimera-1", "disordered-1", "disordered-2", "steady"]
+    figure = rendered(class_map(range(6), range(6), classes))
+    assert len(figure.legends[0].get_texts()) == 6
+
+
 @pytest.fixture
 def runs() -> ClassifiedRuns:
     return ClassifiedRuns(LINKAGE, LEAVES, NAMES, 3.5, TRIPLETS, np.array([0, 0, 1, 1]))

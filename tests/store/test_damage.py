@@ -62,6 +62,14 @@ def test_wrong_length_is_found_without_reading_the_data(
     np.testing.assert_array_equal(store.ledger()["digest"], wanted[1])
 
 
+def test_shard_with_a_hole_is_found_without_reading_the_data(store: Store) -> None:
+    path = store.files.file("u", 1)
+    sound = path.read_bytes()
+    path.write_bytes(sound[10:])
+    wrong = f"{len(sound) - 10} bytes instead of {len(sound)}"
+    assert [str(d) for d in store.find_damaged()] == [f"block 1, u: {wrong}"]
+
+
 @pytest.mark.parametrize("array", ARRAYS)
 def test_any_flipped_bit_is_found_by_the_deep_check(store: Store, array: str) -> None:
     path = store.files.file(array, 2)
@@ -134,7 +142,11 @@ def test_a_file_that_a_network_file_system_shows_late_is_waited_for(store: Store
 def test_damaged_attributes_are_restored_from_their_copy(store: Store) -> None:
     root = store.path / "zarr.json"
     sound = root.read_bytes()
-    for spoilt in (b"", sound[:1000], sound.replace(b'"P": "2:4"', b'"P": "2:5"')):
+    changes = [(b'"P": "2:4"', b'"P": "2:5"'), (b'"crc32c"', b'"crc32d"'), (b"small", b"smell")]
+    changes.append((b'"data_type": "int16"', b'"data_type": "int64"'))
+    altered = [sound.replace(*change) for change in changes]
+    for spoilt in (b"", sound[:1000], *altered):
+        assert spoilt != sound
         root.write_bytes(spoilt)
         opened = Store.open(store.path)
         assert opened.sweep == small_sweep()
@@ -150,6 +162,14 @@ def test_attributes_damaged_beyond_repair_are_bad_input(store: Store) -> None:
     root["attributes"]["spec"]["fixed"]["epsilon"] = 0.06
     (store.path / "zarr.json").write_text(json.dumps(root))
     with pytest.raises(BadInput, match="spec, specs and digest do not belong together"):
+        Store.open(store.path)
+
+
+def test_array_metadata_that_contradict_the_spec_are_bad_input(store: Store) -> None:
+    root = store.path / "zarr.json"
+    (store.path / "zarr.json.copy").unlink()
+    root.write_bytes(root.read_bytes().replace(b'"data_type": "int16"', b'"data_type": "int64"'))
+    with pytest.raises(BadInput, match="the metadata of u are damaged"):
         Store.open(store.path)
 
 

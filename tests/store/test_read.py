@@ -91,6 +91,7 @@ def test_dataset_names_every_quantity(store: Store) -> None:
     for path in (store.path.parent, store.path):
         with chimera_hpc.open(path) as data:
             np.testing.assert_array_equal(data["amplitude"], wanted.features[:, 0])
+            np.testing.assert_array_equal(data["phase"], wanted.features[:, 2])
             assert data["phase"].dims == ("point", "node")
             assert data["phase"].attrs == {"units": "rad", "long_name": "phase"}
             np.testing.assert_array_equal(data["V_Omega"], wanted.scalars[:, 2])

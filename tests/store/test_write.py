@@ -23,6 +23,7 @@ from chimera_hpc.claims import Claim, claim_block
 from chimera_hpc.ledger import digests
 from chimera_hpc.status import Status
 from chimera_hpc.store import ClaimLost, Store
+from chimera_hpc.store.blocks import BlockFiles
 
 
 @pytest.fixture
@@ -95,6 +96,25 @@ def test_data_chunks_without_the_ledgers_are_no_results(store: Store, monkeypatc
     assert store.pending() == [0, 1, 2, 3]
     assert np.isnan(store.features()).all()
     assert [p for p in store.path.rglob(".*.partial")] == []
+
+
+def test_rows_whose_ledger_was_not_reached_are_no_results(store: Store, monkeypatch: Any) -> None:
+    store.write_block(0, results(store, [0]), 1, 1, rows=[0])
+    write = BlockFiles.write
+
+    def dying(files: BlockFiles, block: int, chunks: Any) -> int:
+        if "ledger" in chunks:
+            raise InterruptedError
+        return write(files, block, chunks)
+
+    monkeypatch.setattr(BlockFiles, "write", dying)
+    with pytest.raises(InterruptedError):
+        store.write_block(0, results(store, [1]), 1, 1, rows=[1])
+    assert np.isfinite(store.files.read("features", 0)[1]).all()
+    assert np.isfinite(store.features()[0]).all()
+    assert np.isnan(store.features()[1]).all()
+    assert np.isnan(store.scalars()["V_theta"][1])
+    assert store.find_damaged(deep=True) == []
 
 
 def test_block_taken_over_meanwhile_is_not_entered_into_the_ledger(store: Store) -> None:

@@ -1,0 +1,66 @@
+"""What a job asks to be made of its points beside the classes: named functions, each one entry.
+
+For developers: an analysis is a function that takes a `Given` and returns what results.json is to
+hold of it under ``curves``; one line in `ANALYSES`, its name in `grid.selection`, and where no
+existing figure fits, one in `chimera_hpc.figures`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from chimera_hpc.analyses.given import Given
+from chimera_hpc.analyses.incoherence import agreement, incoherence, sigma_l
+from chimera_hpc.analyses.judged import atlas, robustness
+from chimera_hpc.analyses.method import spectrum, synthetic, variations
+from chimera_hpc.analyses.ring import basin, networks, oscillation, stability
+from chimera_hpc.errors import BadInput
+
+__all__ = ["ANALYSES", "Given", "analyse"]
+
+Analysis = Callable[[Given], dict[str, Any]]
+
+ANALYSES: dict[str, Analysis] = {
+    "networks": networks,
+    "stability": stability,
+    "basin": basin,
+    "oscillation": oscillation,
+    "variations": variations,
+    "atlas": atlas,
+    "robustness": robustness,
+    "incoherence": incoherence,
+    "sigma-l": sigma_l,
+    "agreement": agreement,
+    "synthetic": synthetic,
+    "spectrum": spectrum,
+}
+_NEED_ATLAS = ("atlas", "robustness")
+_NEED_RUNS = ("sigma-l", "agreement", "incoherence", "variations", "spectrum")
+
+
+def analyse(given: Given, say: Callable[[str], None]) -> dict[str, Any]:
+    """Make the analyses that the job asks for; one that can't be made is said, not raised."""
+    made = {}
+    for name in given.sweep.reduction.analyses:
+        reason = _obstacle(name, given)
+        if not reason:
+            try:
+                made[name] = ANALYSES[name](given)
+                continue
+            except BadInput as error:
+                reason = str(error)
+        say(f"analysis {name}: {reason}")
+    return made
+
+
+def _obstacle(name: str, given: Given) -> str:
+    if name in _NEED_ATLAS and not given.atlases:
+        return "no atlas: reduction.atlas names a sweep that has been reduced"
+    if name in _NEED_RUNS and given.has_result.sum() < 2:
+        return "too few runs yet"
+    if name == "agreement" and not given.sweep.reduction.deltas:
+        return "reduction.deltas is needed"
+    if name == "spectrum" and not given.sweep.reduction.show:
+        return "reduction.show names no run"
+    return ""

@@ -1,0 +1,76 @@
+"""Series as integers: rounding, range and missing samples against the slow way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from chimera_hpc.features.series import quantise
+from chimera_hpc.layout import MISSING, SCALE, encode_series
+
+
+def quantised(rows):
+    out = np.full(rows.shape[::-1], 12345, dtype=np.int16)
+    quantise(rows, SCALE, MISSING, out)
+    return out
+
+
+def naive_steps(value):
+    """One sample, by Python's own rounding (half to even)."""
+    if not abs(value) < 4.0 or abs(round(value / 1e-4)) > 32767:
+        return -32768
+    return round(value / 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("value", "steps"),
+    [
+        (0.0, 0),
+        (-0.0, 0),
+        (1.0, 10000),
+        (-1.23456, -12346),
+        (0.00004, 0),
+        (0.00006, 1),
+        (0.5e-4, 0),  # halves go to the even neighbour
+        (2.5e-4, 2),
+        (-2.5e-4, -2),
+        (3.2767, 32767),
+        (-3.2767, -32767),
+        (3.27674, 32767),
+        (3.27676, MISSING),
+        (-3.27676, MISSING),
+        (-3.2768, MISSING),  # the code of a missing sample is no value
+        (6.5536, MISSING),  # would come round to 0
+        (-6.5537, MISSING),
+        (429496.7297, MISSING),
+        (1e15, MISSING),
+        (1e300, MISSING),
+        (np.inf, MISSING),
+        (-np.inf, MISSING),
+        (np.nan, MISSING),
+    ],
+)
+def test_one_sample(value, steps):
+    assert quantised(np.array([[value]]))[0, 0] == steps
+    assert naive_steps(value) == steps
+    assert encode_series(np.array([value]), np.int16)[0] == steps
+
+
+@given(
+    hnp.arrays(
+        np.float64,
+        st.tuples(st.integers(1, 5), st.integers(1, 200)),
+        elements=st.one_of(st.floats(-4, 4), st.floats()),
+    )
+)
+def test_series_equals_the_slow_one_sample_by_sample(rows):
+    expected = [[naive_steps(value) for value in column] for column in rows.T]
+    np.testing.assert_array_equal(quantised(rows), expected)
+
+
+def test_a_row_that_is_not_contiguous_is_read_where_it_is():
+    wide = np.random.default_rng(0).uniform(-2, 2, (3, 400))
+    np.testing.assert_array_equal(quantised(wide[:, ::2]), encode_series(wide[:, ::2].T, np.int16))

@@ -1,0 +1,223 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from chimera_hpc.analyses import ANALYSES, Given, analyse
+from chimera_hpc.grid import Sweep
+from chimera_hpc.grid.selection import ANALYSES as KNOWN
+from chimera_hpc.reduce.atlas import Atlas
+from chimera_hpc.reduce.classify import classify
+from chimera_hpc.reduce.stability import (
+    block_eigenvalues,
+    full_spectrum,
+    predicted_spectrum,
+    residual,
+    spectrum_distance,
+)
+from chimera_hpc.topology import Topology
+
+DONE, STEADY, FAILED = 1, 2, 4
+ATLAS = Atlas(
+    scaler=np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]),
+    points=np.array([[0.1, 0.0, 0.0], [0.3, 0.1, 0.1], [0.5, 0.0, 0.0]]),
+    labels=np.array([0, 1, 2]),
+    names=("ordered", "chimera", "disordered"),
+)
+
+
+def given(grid: dict, status: list[int], atlases=None, reduction=None, **scalars) -> Given:
+    """A tiny finished sweep; scalars that are not named are NaN."""
+    tables = {"grid": grid, "reduction": reduction or {}, "features": {"groups": 2}}
+    sweep = Sweep.from_dict({"name": "tiny", "model": "topological_fhn", **tables})
+    points, n = sweep.points(), len(status)
+    names = ["V_theta", "V_a", "V_Omega", "sigma_1", "range_u", "distance"]
+    columns = {name: np.full(n, np.nan) for name in (*names, "local_sigma_1", "local_sigma_2")}
+    columns |= {name: np.array(values, dtype=float) for name, values in scalars.items()}
+    triplets = np.stack([columns[name] for name in names[:3]], axis=1)
+    codes = np.array(status)
+    made = classify(triplets, np.where(np.isfinite(triplets).all(axis=1), codes, STEADY))
+    return Given(sweep, points, codes, columns, made, made.base, atlases or {})
+
+
+def test_names_of_analyses_are_known_to_the_job_file() -> None:
+    assert tuple(ANALYSES) == KNOWN
+
+
+def test_blocks_of_a_ring_have_the_spectrum_of_the_whole_jacobian() -> None:
+    ring = Topology.ring(9, 3).reorient_node(0, 2)
+    for u in (0.0, np.sqrt(3.0)):
+        blocks = predicted_spectrum(ring, 0.05, -0.01, u)
+        whole = full_spectrum(ring, 0.05, -0.01, u)
+        assert len(blocks) == len(whole) == 9 + 27
+        assert spectrum_distance(blocks, whole) < 1e-9
+
+
+def test_a_block_by_hand() -> None:
+    # s = -2, epsilon = 1, c = -1, b = 1: l^2 + 3 l + 3 = 0
+    found = block_eigenvalues(-2.0, 1.0, -1.0, np.array([1.0]))[0]
+    expected = [-1.5 - 0.5j * np.sqrt(3.0), -1.5 + 0.5j * np.sqrt(3.0)]
+    assert sorted(found, key=lambda z: z.imag) == pytest.approx(expected)
+
+
+def test_distance_of_spectra_looks_both_ways() -> None:
+    one, two = np.array([0j, 1j]), np.array([0j])
+    assert spectrum_distance(one, two) == spectrum_distance(two, one) == 1.0
+
+
+def test_reorientation_breaks_the_equilibrium() -> None:
+    plain = Topology.ring(9, 3)
+    assert residual(plain, 0.5, -0.01, np.sqrt(3.0)) < 1e-12
+    # s = -2 and +2 next to node 1, times v = -b/c = 50
+    assert residual(plain.reorient_node(0, 1), 0.5, -0.01, np.sqrt(3.0)) == pytest.approx(100.0)
+
+
+def test_networks_count_the_links_that_turned() -> None:
+    made = ANALYSES["networks"](given({"P": 3, "Q": [0, 1, 3]}, [STEADY] * 3))
+    assert [panel["reoriented"] for panel in made["panels"]] == [0, 2, 6]
+
+
+def test_basin_counts_runs_within_their_own_radius() -> None:
+    grid = {"P": [1, 2], "Q": 0, "delta": [0.5, 1.0], "seeds": 2}
+    distance = [0.4, 0.5, 0.2, 2.0, 0.6, np.nan, 0.9, 0.9]
+    state = [STEADY] * 5 + [FAILED] + [STEADY] * 2
+    made = ANALYSES["basin"](given(grid, state, distance=distance))
+    np.testing.assert_array_equal(made["fraction"], [[1.0, 0.5], [0.0, 1.0]])
+    np.testing.assert_array_equal(made["trials"], [[2, 2], [1, 2]])
+    np.testing.assert_array_equal(made["safe_radius"], [0.5, np.nan])
+    np.testing.assert_array_equal(made["radius_of_half"], [1.0, 1.0])
+
+
+def test_oscillation_leaves_failed_runs_out() -> None:
+    made = ANALYSES["oscillation"](
+        given({"P": [1, 2], "Q": 1, "seeds": 2}, [STEADY, FAILED, DONE, 3])
+    )
+    assert [(c["oscillating"], c["runs"]) for c in made["cells"]] == [(0, 1), (2, 2)]
+
+
+def test_atlas_judges_runs_and_averages_those_of_the_modal_class() -> None:
+    runs = given(
+        {"P": 5, "Q": 5, "seeds": 4},
+        [DONE, DONE, DONE, STEADY],
+        {"other": ATLAS},
+        V_theta=[0.3, 0.32, 0.1, np.nan],
+        V_a=[0.1, 0.1, 0.0, np.nan],
+        V_Omega=[0.1, 0.1, 0.0, np.nan],
+    )
+    (cell,) = ANALYSES["atlas"](runs)["judges"]["other"]
+    assert cell["class"] == "chimera"
+    assert cell["votes"] == {"ordered": 1, "chimera": 2, "steady": 1}
+    assert cell["triplet"] == pytest.approx([0.31, 0.1, 0.1])
+    assert cell["distance"] == pytest.approx(0.01)
+
+
+def test_robustness_is_the_share_of_chimeras_by_reversed_links() -> None:
+    runs = given(
+        {"P": 13, "Q": 13, "flips": [0, 5], "seeds": 2},
+        [DONE, DONE, DONE, STEADY],
+        {"other": ATLAS},
+        V_theta=[0.3, 0.3, 0.5, np.nan],
+        V_a=[0.1, 0.1, 0.0, np.nan],
+        V_Omega=[0.1, 0.1, 0.0, np.nan],
+    )
+    made = ANALYSES["robustness"](runs)
+    curve = made["by"]["other"]
+    assert made["label"] == "orientation 1"
+    assert (curve["hits"], curve["trials"]) == ([2, 0], [2, 2])
+    assert (curve["holds_until"], curve["zero_from"]) == (0.0, 5.0)
+    np.testing.assert_array_equal(curve["others"]["disordered"], [0.0, 0.5])
+
+
+def test_incoherence_scales_delta_by_the_range_of_each_run() -> None:
+    runs = given(
+        {"P": 5, "Q": 5, "seeds": 2},
+        [DONE, STEADY],
+        reduction={"deltas": [0.1]},
+        local_sigma_1=[0.3, 0.3],
+        local_sigma_2=[0.5, 0.5],
+        range_u=[4.0, 2.0],
+    )
+    made = ANALYSES["incoherence"](runs)
+    (row,) = made["range"]["by_delta"][0]["rows"]
+    # 0.1 * 4 = 0.4 lies between both deviations, 0.1 * 2 below both
+    np.testing.assert_array_equal(row["runs"], [0.5, 1.0])
+    assert (row["median"], row["discontinuity"]) == (0.75, 0.5)
+    (absolute,) = made["absolute"]["by_delta"][0]["rows"]
+    np.testing.assert_array_equal(absolute["runs"], [1.0, 1.0])
+
+
+def three_kinds(n: int = 12) -> Given:
+    rng = np.random.default_rng(3)
+    kind = np.repeat([0, 1, 2], n)
+    scatter = 0.01 * rng.standard_normal(3 * n)
+    centre = np.array([0.2, 1.3, 2.1])[kind]
+    return given(
+        {"P": [5, 12, 21], "Q": "P", "seeds": n},
+        [DONE] * 3 * n,
+        reduction={"deltas": [0.1]},
+        sigma_1=centre + scatter,
+        range_u=np.full(3 * n, 4.0),
+        local_sigma_1=np.array([0.1, 0.1, 2.0])[kind],
+        local_sigma_2=np.array([0.1, 2.0, 2.0])[kind],
+        V_theta=np.array([0.05, 0.25, 0.5])[kind] + scatter,
+        V_a=np.array([0.01, 0.09, 0.02])[kind],
+        V_Omega=np.array([0.01, 0.1, 0.01])[kind],
+    )
+
+
+def test_sigma_l_finds_three_classes_along_p() -> None:
+    made = ANALYSES["sigma-l"](three_kinds())
+    assert made["n_classes"] == 3
+    assert [cell["class"] for cell in made["cells"]] == ["ordered", "chimera", "disordered"]
+
+
+def test_three_methods_that_agree_have_diagonal_matrices() -> None:
+    made = ANALYSES["agreement"](three_kinds())
+    assert [pair["agreement"] for pair in made["pairs"]] == [1.0, 1.0, 1.0]
+    assert [pair["cells_equal"] for pair in made["pairs"]] == [3, 3, 3]
+    assert made["differing"] == []
+
+
+def test_methods_that_differ_are_listed_by_cell() -> None:
+    runs = three_kinds()
+    runs.scalars["local_sigma_2"][:12] = 2.0  # P = 5: half of the groups are incoherent now
+    made = ANALYSES["agreement"](runs)
+    assert [cell["P"] for cell in made["differing"]] == [5]
+    np.testing.assert_array_equal(made["pairs"][0]["counts"], [[0, 12, 0], [0, 12, 0], [0, 0, 12]])
+
+
+def test_variations_are_quantiles_of_oscillating_runs() -> None:
+    runs = given(
+        {"P": 5, "Q": 5, "seeds": 4},
+        [DONE, DONE, DONE, STEADY],
+        V_theta=[0.1, 0.2, 0.4, np.nan],
+        V_a=[0.0] * 3 + [np.nan],
+        V_Omega=[0.0] * 3 + [np.nan],
+        sigma_1=[1.0, 2.0, 3.0, 9.0],
+    )
+    (cell,) = ANALYSES["variations"](runs)["cells"]
+    assert (cell["runs"], cell["V_theta"][3], cell["sigma_1"][-1]) == (3, 0.2, 3.0)
+
+
+def test_the_synthetic_signal_is_reconstructed() -> None:
+    made = ANALYSES["synthetic"](given({"P": 5, "Q": 5}, [DONE]))
+    assert made["largest_error"]["sine-fit"]["phase"] < 0.02
+    assert made["largest_error"]["sine-fit"]["frequency"] < 1e-6
+
+
+def test_spectrum_of_a_cosine_has_its_peak_in_the_ninth_line() -> None:
+    runs = given({"P": 12, "Q": 12}, [DONE], reduction={"show": ["P=12"]})
+    t = 950.0 + 0.01 * np.arange(5001)
+    u = np.cos(2.0 * np.pi * 4.0 * t)[:, None] * np.ones(3)
+    made = ANALYSES["spectrum"](Given(**{**vars(runs), "series": lambda i: (t, u)}))
+    assert (made["peak"], made["n_samples"]) == (9, 226)
+    assert made["amplitude"][9] == pytest.approx(1.0, abs=0.01)
+
+
+def test_what_cannot_be_made_is_said_and_the_rest_is_made() -> None:
+    wish = {"analyses": ["atlas", "agreement", "oscillation"]}
+    said: list[str] = []
+    made = analyse(given({"P": 5, "Q": 5, "seeds": 2}, [DONE, DONE], reduction=wish), said.append)
+    assert list(made) == ["oscillation"]
+    assert "reduction.atlas" in said[0]
+    assert "reduction.deltas" in said[1]

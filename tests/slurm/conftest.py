@@ -1,0 +1,38 @@
+"""One real SLURM for all tests here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from slurm.real import Slurm
+from slurm.sweeps import sweep, write_job
+
+
+@pytest.fixture(scope="session")
+def slurm_session() -> Iterator[Slurm]:
+    started = Slurm()
+    yield started
+    started.stop()
+
+
+@pytest.fixture
+def slurm(slurm_session: Slurm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Slurm]:
+    monkeypatch.setenv("SLURM_CONF", str(slurm_session.conf))
+    monkeypatch.setenv("CHIMERA_HPC_PRIVATE", str(tmp_path / "private"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    yield slurm_session
+    slurm_session.drain()
+
+
+@pytest.fixture(scope="session")
+def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the same sweep computed by one process."""
+    folder = tmp_path_factory.mktemp("serial")
+    done = sweep(
+        *("run", write_job(folder), "--out", folder / "out"),
+        *("--cluster", "serial", "--no-figures"),
+    )
+    assert done.returncode == 0, done.stderr
+    return folder / "out"

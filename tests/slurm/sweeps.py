@@ -1,0 +1,73 @@
+"""Small sweeps, the command line as its own process, and how stores compare."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chimera_hpc.ledger import read_ledger
+
+JOB = """
+name = "small"
+model = "topological_fhn"
+[grid]
+P = "2:5"
+Q = "0:3"
+seeds = 4
+[fixed]
+n_nodes = 12
+[integrator]
+t_end = {t_end}
+t_step = 0.5
+[features]
+start = 10.0
+[keep]
+series = "none"
+[run]
+block = {block}
+patience = 20.0
+[slurm]
+interface = "lo"
+mem = "700M"
+time = "5"
+workers = 2
+array = 4
+"""
+
+
+def write_job(folder: Path, t_end: float = 20.0, block: int = 4) -> Path:
+    """Write a job of 64 points."""
+    path = folder / "small.toml"
+    path.write_text(JOB.format(t_end=t_end, block=block))
+    return path
+
+
+def command(*words: object) -> list[str]:
+    """Return the command line of the sweep's program."""
+    return [sys.executable, "-m", "chimera_hpc.sweep", *map(str, words)]
+
+
+def sweep(*words: object, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+    """Run a command of the sweep in a process of its own."""
+    return subprocess.run(
+        command(*words), capture_output=True, text=True, timeout=timeout, check=False
+    )
+
+
+def digests(folder: Path) -> np.ndarray[Any, Any]:
+    """Return the digest of every point in a sweep's folder."""
+    return read_ledger(folder / "store.zarr")["digest"]
+
+
+def n_done(folder: Path) -> int:
+    """Return how many points have an end, good or bad."""
+    return int((read_ledger(folder / "store.zarr")["status"] != 255).sum())
+
+
+def logs(folder: Path) -> str:
+    """Return all logs of a sweep's jobs."""
+    return "\n".join(p.read_text() for p in sorted((folder / "slurm").glob("*.[loe][our][gtr]")))
