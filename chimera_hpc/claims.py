@@ -187,9 +187,17 @@ def _highest(folder: Path) -> list[tuple[int, Path, bool]]:
         if match and match["block"].isdecimal():
             block, attempt = int(match["block"]), int(match["attempt"])
             highest[block] = max(highest.get(block, 0), attempt)
-    now = server_time(folder) if highest else 0.0
+    now = _time_there(folder) if highest else 0.0
     paths = {block: _path(folder, block, attempt) for block, attempt in sorted(highest.items())}
     return [(block, path, _is_free(path, now)) for block, path in paths.items()]
+
+
+def _time_there(folder: Path) -> float:
+    """Return the file server's time, or this machine's where nothing can be written."""
+    try:
+        return server_time(folder)
+    except OSError:
+        return time.time()
 
 
 def _content(

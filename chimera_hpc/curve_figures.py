@@ -7,11 +7,12 @@ has not made the analysis behind it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from chimera_hpc.outcome import Outcome
 from chimera_hpc.plot.agreement import Comparison, confusion_matrices, verdicts
 from chimera_hpc.plot.atlas import Diamonds, atlas
 from chimera_hpc.plot.basin import basin
@@ -23,9 +24,6 @@ from chimera_hpc.plot.spacetime import space_time
 from chimera_hpc.plot.spectrum import Spectrum, spectrum
 from chimera_hpc.plot.stability import stability
 from chimera_hpc.plot.synthetic import reconstruction
-
-if TYPE_CHECKING:
-    from chimera_hpc.figures import Outcome
 
 _SPOKEN = {"SI": "SI", "triplets": "triplets", "sigma_1": r"$\sigma_1$"}
 

@@ -154,12 +154,14 @@ class _Window:
         """Return the receipt of a block, or None when its worker died."""
         from distributed.scheduler import KilledWorker
 
-        if future.cancelled():
-            raise ClusterLost("the scheduler is gone")
-        error = future.exception()
-        if error is None:
-            receipt: BlockReceipt = future.result()
-            return receipt
+        try:
+            error = None if future.cancelled() else future.exception()
+            if error is None:
+                receipt: BlockReceipt = future.result()
+                return receipt
+        except (CancelledError, OSError, TimeoutError):
+            # `do_block` raises none of these: they tell of the way to the scheduler.
+            raise ClusterLost("the scheduler is gone") from None
         if isinstance(error, KilledWorker):
             return None
         raise error

@@ -8,7 +8,6 @@ one line in `FIGURES` or `CUT_FIGURES`; and its name in `grid.selection`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from chimera_hpc.curve_figures import CURVE_FIGURES
 from chimera_hpc.features import FEATURES as LABELS
 from chimera_hpc.grid.selection import split_figure_name
+from chimera_hpc.outcome import Outcome, Run
 from chimera_hpc.plot.classification import (
     ClassifiedRuns,
     classification_against,
@@ -29,62 +29,11 @@ from chimera_hpc.plot.indicators import Profiles, fourier_indicators
 from chimera_hpc.plot.modes import class_against, class_map
 from chimera_hpc.plot.projections import projections
 from chimera_hpc.plot.spacetime import space_time
-from chimera_hpc.reduce.classify import Classification
 
 Array = NDArray[np.float64]
 
 _PERIODS = 12
 """Periods in the close-up of a space-time plot."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """One run to draw."""
-
-    place: str
-    """Parameters and seed."""
-    t: Array
-    """(T,) uniform"""
-    u: Array
-    """(T, N)"""
-    class_name: str = ""
-    features: Array | None = None
-    """(8, N) in the order of `features.FEATURES`; None where the run has none."""
-    triplet: Array | None = None
-    """(3,) V_theta, V_a, V_Omega; None where the run has none."""
-
-    @property
-    def title(self) -> str:
-        """Place and class, a line each."""
-        return "\n".join(filter(None, [self.place, self.class_name]))
-
-    @property
-    def frequency(self) -> float:
-        """Median over the nodes, NaN without features."""
-        if self.features is None:
-            return float("nan")
-        return float(np.median(self.features[LABELS.index("frequency")]))
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """All that figures of a sweep are drawn from; n points in n_cells cells."""
-
-    classification: Classification
-    triplets: Array
-    """(n, 3) V_theta, V_a, V_Omega"""
-    axes: Sequence[tuple[str, NDArray[Any]]]
-    """Label and value in each cell (n_cells,) of what varies between cells."""
-    cells: Mapping[int, Sequence[Mapping[str, Any]]]
-    """For each cut its cells (n_cells,) with ``class`` and ``votes``."""
-    curves: Mapping[str, Any] = field(default_factory=dict)
-    """What analyses made, as in results.json."""
-    beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """``curves`` of the sweeps that are drawn with this one, by their names."""
-    shown: Sequence[Run] = ()
-    """Runs over the analysis interval."""
-    whole: Sequence[Run] = ()
-    """Runs from t = 0 to the end."""
 
 
 Maker = Callable[[Outcome], Figure | None]

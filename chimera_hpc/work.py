@@ -144,8 +144,12 @@ def do_block(
     local_stop : callable, optional
         A second reason to stop, beside the run's stop file.
     """
+    stop = StopSignal(orders.stop_file, local_stop)
+    if stop():
+        # It waited in a worker's queue: nothing is begun that would only be broken off.
+        return BlockReceipt(block, stopped=True)
     try:
-        return _Block(orders, block, StopSignal(orders.stop_file, local_stop)).do()
+        return _Block(orders, block, stop).do()
     except ClaimLost:
         return BlockReceipt(block, taken=True)
     except OSError as error:

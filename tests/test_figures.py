@@ -10,8 +10,10 @@ import pytest
 from matplotlib.colors import to_hex
 
 from chimera_hpc import figures
-from chimera_hpc.figures import Outcome, Run, choose, is_figure_name
+from chimera_hpc.curve_figures import CURVE_FIGURES
+from chimera_hpc.figures import choose, is_figure_name
 from chimera_hpc.grid import selection
+from chimera_hpc.outcome import Outcome, Run
 from chimera_hpc.plot.style import BLACK, BLUE, RED
 from chimera_hpc.reduce.classify import classify
 from chimera_hpc.status import Status
@@ -48,15 +50,18 @@ def colours_of_points(axes):
 
 
 def test_registry_has_the_names_that_a_job_may_use():
-    assert tuple(figures.FIGURES) == selection.FIGURES
+    assert tuple(figures.FIGURES) == (*selection.FIGURES, *selection.CURVE_FIGURES)
     assert tuple(figures.CUT_FIGURES) == selection.CUT_FIGURES
 
 
 def test_auto_draws_the_first_cut_in_every_way_and_the_composite_of_each():
-    assert list(choose("auto", [4, 3, 5])) == [
-        "space_time", "indicators", "whole_run", "dendrogram_4", "projections_4",
-        "modal_classes_4", "classification_4", "classification_3", "classification_5",
+    names = list(choose("auto", [4, 3, 5]))
+    assert names[:3] == ["space_time", "indicators", "whole_run"]
+    assert names[-6:] == [
+        "dendrogram_4", "projections_4", "modal_classes_4",
+        "classification_4", "classification_3", "classification_5",
     ]  # fmt: skip
+    assert set(names[3:-6]) == set(CURVE_FIGURES)
 
 
 def test_list_of_figures_draws_these_and_no_others():

@@ -96,15 +96,26 @@ def _last_above(radius: Any, fraction: Any, level: float) -> list[float]:
 
 
 def oscillation(given: Given) -> dict[str, Any]:
-    """Share of runs that oscillate in each cell, with a Wilson 95 % interval (sec:moredetdyn)."""
-    moving = np.isin(given.status, [Status.DONE, Status.NO_WINDOW])
-    counted = given.has_result
-    trials = np.bincount(given.cell[counted], minlength=given.n_cells)
-    hits = np.bincount(given.cell[counted & moving], minlength=given.n_cells)
-    low, high = wilson_interval(hits, trials)
+    """Runs of each cell that oscillate, move without oscillating, and rest (sec:moredetdyn).
+
+    ``oscillating``: ten maxima fit into the analysis, so the Fourier method can be applied.
+    ``moving``: the signal moves by more than ``features.still``, but too slowly for that. The
+    interval is Wilson's, 95 %, for the share of oscillating runs.
+    """
+    state = [given.status == code for code in (Status.DONE, Status.NO_WINDOW, Status.STEADY)]
+    count = [np.bincount(given.cell[which], minlength=given.n_cells) for which in state]
+    runs = np.sum(count, axis=0)
+    low, high = wilson_interval(count[0], runs)
     cells = [
-        {**given.place(i), "oscillating": int(hits[i]), "runs": int(trials[i])}
-        | {"low": float(low[i]), "high": float(high[i])}
+        {
+            **given.place(i),
+            "oscillating": int(count[0][i]),
+            "moving": int(count[1][i]),
+            "resting": int(count[2][i]),
+            "runs": int(runs[i]),
+            "low": float(low[i]),
+            "high": float(high[i]),
+        }
         for i in range(given.n_cells)
     ]
-    return {"cells": cells, "runs": int(trials.sum()), "oscillating": int(hits.sum())}
+    return {"cells": cells, "runs": int(runs.sum()), "oscillating": int(count[0].sum())}

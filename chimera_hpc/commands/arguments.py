@@ -148,6 +148,10 @@ def place_of(args: Namespace, sweep: Sweep) -> Place:
         raise BadInput(f"--workers {args.workers}: allowed is 1 or more")
     if (args.cluster == "scheduler-file") != (args.scheduler_file is not None):
         raise BadInput("--cluster scheduler-file and --scheduler-file FILE go together")
+    if args.scheduler_file is not None and not args.scheduler_file.is_file():
+        raise BadInput(
+            f"{args.scheduler_file}: no such file; dask scheduler --scheduler-file makes it"
+        )
     if args.memory is not None and not _SIZE.fullmatch(args.memory):
         raise BadInput(f"--memory {args.memory}: a size such as 800MB or 2GB is needed")
     workers = args.workers or sweep.run.workers

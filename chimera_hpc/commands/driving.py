@@ -127,6 +127,8 @@ class Driver:
                 self._serial(orders)
             else:
                 self._on_cluster(orders)
+        except OSError as error:
+            self.ended_by = f"{error.strerror or error}" + f" ({error.filename})"
         finally:
             _remove(orders.stop_file)
 

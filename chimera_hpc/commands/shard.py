@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from chimera_hpc.commands.arguments import add_out, add_resubmit, load_job, store_path, sweep_folder
 from chimera_hpc.commands.driving import Driver, Place
@@ -13,6 +16,10 @@ from chimera_hpc.commands.resubmitting import go_on
 from chimera_hpc.commands.run import open_or_plan
 from chimera_hpc.commands.stopping import stop_request
 from chimera_hpc.errors import BadInput
+from chimera_hpc.ledger import FAILED
+
+if TYPE_CHECKING:
+    from chimera_hpc.store import Store
 
 NAME = "shard"
 HELP = "compute one share of a sweep's blocks, straight into its store"
@@ -88,6 +95,12 @@ def _store_path(folder: Path, out: Path | None) -> Path:
         return open_or_plan(place, sweep, yes=False).path
 
 
+def _failed_points(store: Store, index: int, of: int) -> int:
+    codes = store.ledger()["status"]
+    mine = np.arange(len(codes)) // store.block_size % of == index
+    return int(np.isin(codes[mine], FAILED).sum())
+
+
 def _end(driver: Driver) -> int:
     """Say how the share went, and return the exit status."""
     left = driver.pending()
@@ -98,6 +111,6 @@ def _end(driver: Driver) -> int:
         return Exit.MORE_TO_DO if driver.ended_by else driver.stop.exit_status
     for block, trouble in driver.broken.items():
         print(f"block {block} could not be done: {trouble.text} (more in {driver.log})")
-    failed = driver.failed_points()
+    failed = _failed_points(driver.store, index, of)
     print(f"{name}: done" + (f", {failed} points failed" if failed else ""))
     return Exit.FAILURES if failed or driver.broken else Exit.COMPLETE

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 # Wall time that one call of the compiled loop aims at, seconds: the GIL comes back, time-outs and
 # stop signals are seen.
 SLICE = 0.1
-# Steps times numbers of the state in the first call, before the speed is known, and most steps in it.
+# Steps times numbers of the state in the first call, before the speed is known, and its most steps.
 FIRST_WORK, FIRST_STEPS = 2_000_000, 64
 # Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
 SAMPLE_BYTES = 96_000_000

@@ -21,11 +21,13 @@ from chimera_hpc.reduce.classify import Classification, classify
 from chimera_hpc.reduce.modes import run_names
 from chimera_hpc.reduce.record import reduction_variables
 from chimera_hpc.reduce.results import TRIPLET, build_results, to_json
+from chimera_hpc.status import Status
 from chimera_hpc.store import Store
 from chimera_hpc.store.labelled import STORE_NAME
 
 if TYPE_CHECKING:
-    from chimera_hpc.figures import Maker, Outcome
+    from chimera_hpc.figures import Maker
+    from chimera_hpc.outcome import Outcome
 
 RESULTS, FIGURES = "results.json", "figures"
 
@@ -218,13 +220,16 @@ class _Work:
         return made
 
     def _outcome(self, names: Mapping[str, object]) -> Outcome:
-        from chimera_hpc.figures import Outcome
+        from chimera_hpc.outcome import Outcome
         from chimera_hpc.outputs.atlases import curves_beside
         from chimera_hpc.outputs.runs import shown_runs, whole_runs
 
         store, made = self.store, self.classification
         first = made.cuts[self.cuts[0]]
         runs = run_names(first.labels, self.status, first.names)
+        for atlas in list(self.atlases.values())[:1]:  # the judge's names, where there is one
+            verdicts = zip(atlas.classify(self.triplets).name, runs, self.status, strict=True)
+            runs = [name if code == Status.DONE else run for name, run, code in verdicts]
         needs_runs = {"space_time", "indicators", "incoherence"} & set(names)
         return Outcome(
             classification=made,

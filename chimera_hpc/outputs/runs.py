@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.figures import Run
 from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.grid.selection import parse_selection
 from chimera_hpc.grid.tables import Keep
 from chimera_hpc.layout import sample_times, series_mask
+from chimera_hpc.outcome import Run
 from chimera_hpc.outputs.cells import FreeAxis, describe
 from chimera_hpc.outputs.selection import find_point, single_point
 from chimera_hpc.reduce.classify import Cut

@@ -197,11 +197,13 @@ def rising_medians(evidence: Evidence, job: str, quantity: str, order: Sequence[
     return verdict(bool(np.all(np.diff(medians) > 0)), f"medians {text}")
 
 
-def still(evidence: Evidence, job: str, where: Cell) -> Verdict:
-    """No run of a cell oscillates."""
+def still(evidence: Evidence, job: str, where: Cell, strictly: bool = False) -> Verdict:
+    """No run of a cell oscillates; strictly: none moves at all."""
     cells = select(evidence.value(job, "curves/oscillation/cells"), where)
-    moving, runs = (sum(cell[key] for cell in cells) for key in ("oscillating", "runs"))
-    return share(moving == 0, moving, runs, "runs oscillate")
+    names = ("oscillating", "moving", "runs")
+    fast, slow, runs = (sum(cell[name] for cell in cells) for name in names)
+    hits = fast + slow if strictly else fast
+    return share(hits == 0, hits, runs, f"{fast} oscillate, {slow} move slowly")
 
 
 def safe_radius(

@@ -21,7 +21,7 @@ from chimera_hpc.slurm.workers import Say, tunnel, worker_settings
 if TYPE_CHECKING:
     from distributed import Client
 
-_END_SECONDS = 15.0
+_END_SECONDS = 5.0
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import re
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from pathlib import Path
 
@@ -54,6 +54,15 @@ def environment_lines() -> list[str]:
     ]
 
 
+def compile_line(python: str, store: Path) -> str:
+    """Return the shell line that compiles the kernels: the first job of a node does, others wait.
+
+    Where there is no lock to be had, each job compiles for itself.
+    """
+    warm = shlex.join([python, "-m", "chimera_hpc.slurm.warm", str(store)])
+    return f'mkdir -p "$NUMBA_CACHE_DIR" && flock -w 900 "$NUMBA_CACHE_DIR" {warm} || true'
+
+
 @dataclass(frozen=True)
 class Target:
     """What the jobs work on."""
@@ -70,6 +79,8 @@ class Target:
     resubmit: int = 0
     drain: float | None = None
     overrides: tuple[str, ...] = ()
+    planned: bool = True
+    """Whether the store exists when the job is submitted."""
 
     def command(self, *words: str) -> str:
         """Return the line that runs a command of the sweep in place of the shell."""
@@ -89,8 +100,14 @@ def array_script(target: Target, wishes: Slurm) -> str:
     """Return a job array: each element does its share of the blocks, with nobody between."""
     n = wishes.array or ARRAY
     options = [f"--array=0-{n - 1}", "--ntasks=1", f"--mem={wishes.mem or MEMORY}"]
-    words = ["shard", str(target.folder), "--of", str(n), *target.again()]
-    return _script(target, wishes, options, target.command(*words), "%A_%a")
+    what = (
+        [str(target.folder)] if target.planned else [str(target.job), "--out", str(target.folder)]
+    )
+    lines = [
+        compile_line(target.python, target.folder if target.planned else target.job),
+        target.command("shard", *what, "--of", str(n), *target.again()),
+    ]
+    return _script(target, wishes, options, "\n".join(lines), "%A_%a")
 
 
 def allocation_script(target: Target, wishes: Slurm) -> str:
@@ -131,12 +148,10 @@ SCRIPTS = {
 
 def templates() -> dict[str, str]:
     """Return the scripts that the project carries ready-made, by name, for the quickstart job."""
-    target = Target(Path("jobs/quickstart.toml"), Path("results/quickstart"), "", python="python")
-    wishes = Slurm.model_validate({})
+    job, folder = Path("jobs/quickstart.toml"), Path("results/quickstart")
+    target = Target(job, folder, "", python="python", planned=False)
     return {
-        name: make(
-            Target(target.job, target.folder, f"chimera-quickstart-{name}", target.python), wishes
-        )
+        name: make(replace(target, name=f"chimera-quickstart-{name}"), Slurm.model_validate({}))
         for name, make in SCRIPTS.items()
     }
 

@@ -1,4 +1,4 @@
-"""Compile what a store needs, once on a node: ``python -m chimera_hpc.slurm.warm STORE``."""
+"""Compile what a sweep needs, once on a node: ``python -m chimera_hpc.slurm.warm DIR|JOB.toml``."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import sys
 from pathlib import Path
 
 
-def main(store: str) -> None:
-    """Compile the kernels of a store's points, or find them compiled."""
+def main(path: Path) -> None:
+    """Compile the kernels of a sweep's points, or find them compiled."""
+    from chimera_hpc.grid import Sweep
     from chimera_hpc.store import Store
     from chimera_hpc.task import warm_up
 
-    opened = Store.open(Path(store))
-    warm_up(opened.sweep, opened.points)
+    sweep = Sweep.load(path) if path.is_file() else Store.open(path / "store.zarr").sweep
+    warm_up(sweep, sweep.points())
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(Path(sys.argv[1]))

@@ -12,6 +12,7 @@ import getpass
 import logging
 import signal
 import socket
+import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -24,7 +25,15 @@ from chimera_hpc.errors import BadInput
 from chimera_hpc.grid.tables import Slurm
 from chimera_hpc.slurm import queue
 from chimera_hpc.slurm.queue import SlurmFailed
-from chimera_hpc.slurm.script import LOGS, MEMORY, TIME, WORKERS, environment_lines, job_name
+from chimera_hpc.slurm.script import (
+    LOGS,
+    MEMORY,
+    TIME,
+    WORKERS,
+    compile_line,
+    environment_lines,
+    job_name,
+)
 from chimera_hpc.slurm.tls import Certificate, fresh_certificate
 from chimera_hpc.slurm.walltime import WORKER
 
@@ -143,7 +152,7 @@ def slurm_cluster(
     with (
         dask.config.set(settings(patience) | {"distributed.deploy.lost-worker-timeout": "30d"}),
         fresh_certificate(name, store) as certificate,
-        _cluster(wishes, name, logs, certificate) as cluster,
+        _cluster(wishes, name, store, certificate) as cluster,
     ):
         queue.check(cluster.job_script())
         with Client(cluster) as client:
@@ -180,10 +189,12 @@ def _prepare(client: Client) -> None:
     client.register_plugin(Manners())
 
 
-def _cluster(wishes: Slurm, name: str, logs: Path, certificate: Certificate) -> Any:
+def _cluster(wishes: Slurm, name: str, store: Path, certificate: Certificate) -> Any:
     cluster, job = _classes()
     options = {"dashboard_address": f"{LOOPBACK}:0"}
-    prologue = [*environment_lines(), f"export {WORKER}=1", *worker_settings(), *wishes.setup]
+    compile_once = compile_line(sys.executable, store)
+    marks = [f"export {WORKER}=1", *worker_settings()]
+    prologue = [*environment_lines(), *marks, *wishes.setup, compile_once]
     return cluster(
         job_cls=job,
         cores=1,
@@ -195,7 +206,7 @@ def _cluster(wishes: Slurm, name: str, logs: Path, certificate: Certificate) -> 
         account=wishes.account,
         job_name=name,
         interface=wishes.interface,
-        log_directory=str(logs),
+        log_directory=str(store.parent / LOGS),
         job_script_prologue=prologue,
         job_extra_directives=["--requeue", "--open-mode=append", *wishes.extra],
         worker_extra_args=["--dashboard-address", f"{LOOPBACK}:0"],
@@ -216,14 +227,13 @@ def _classes() -> tuple[Any, Any]:
     """Import dask-jobqueue, which takes SIGINT for itself, and give SIGINT back."""
     before = signal.getsignal(signal.SIGINT)
     try:
-        from dask_jobqueue import SLURMCluster
-        from dask_jobqueue.slurm import SLURMJob
+        from dask_jobqueue.slurm import SLURMCluster, SLURMJob
     except ImportError:
         raise BadInput("--cluster slurm needs the extra: pip install chimera_hpc[slurm]") from None
     finally:
         signal.signal(signal.SIGINT, before)
 
-    class Job(SLURMJob):  # type: ignore[misc]
+    class Job(SLURMJob):
         """A worker's job, submitted with patience; a refusal is kept for the keeper."""
 
         refused: str | None = None

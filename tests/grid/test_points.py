@@ -77,10 +77,10 @@ def test_every_parameter_is_a_column_of_its_type():
     points = sweep({"P": [5], "Q": "P"}).points()
     assert points.row(0) == {
         "P": 5, "Q": 5, "orientation": 1, "epsilon": 0.05, "b": 0.5, "c": -0.01, "flips": 0,
-        "delta": 0.001, "seed": 0,
+        "flip_set": 0, "delta": 0.001, "seed": 0,
     }  # fmt: skip
     integers = {name for name, column in points.columns.items() if column.dtype == np.int64}
-    assert integers == {"P", "Q", "orientation", "flips", "seed"}
+    assert integers == {"P", "Q", "orientation", "flips", "flip_set", "seed"}
     assert all(column.dtype in (np.int64, np.float64) for column in points.columns.values())
 
 

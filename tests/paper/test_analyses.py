@@ -88,11 +88,15 @@ def test_basin_counts_runs_within_their_own_radius() -> None:
     np.testing.assert_array_equal(made["radius_of_half"], [1.0, 1.0])
 
 
-def test_oscillation_leaves_failed_runs_out() -> None:
+def test_oscillation_tells_slow_motion_from_rest_and_leaves_failed_runs_out() -> None:
     made = ANALYSES["oscillation"](
         given({"P": [1, 2], "Q": 1, "seeds": 2}, [STEADY, FAILED, DONE, 3])
     )
-    assert [(c["oscillating"], c["runs"]) for c in made["cells"]] == [(0, 1), (2, 2)]
+    names = ("oscillating", "moving", "resting", "runs")
+    assert [[cell[name] for name in names] for cell in made["cells"]] == [
+        [0, 0, 1, 1],
+        [1, 1, 0, 2],
+    ]
 
 
 def test_atlas_judges_runs_and_averages_those_of_the_modal_class() -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from slurm.real import Slurm
-from slurm.sweeps import sweep, write_job
+from slurm_real import Slurm
+from slurm_sweeps import sweep, write_job
 
 
 @pytest.fixture(scope="session")
@@ -21,6 +22,9 @@ def slurm_session() -> Iterator[Slurm]:
 def slurm(slurm_session: Slurm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Slurm]:
     monkeypatch.setenv("SLURM_CONF", str(slurm_session.conf))
     monkeypatch.setenv("CHIMERA_HPC_PRIVATE", str(tmp_path / "private"))
+    # The kernels that the tests around have compiled.
+    kernels = Path.home() / ".cache" / "chimera_hpc" / "numba"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", os.environ.get("NUMBA_CACHE_DIR", str(kernels)))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     yield slurm_session
     slurm_session.drain()

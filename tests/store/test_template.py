@@ -44,7 +44,7 @@ else:
 for chunks in ({}, None):
     with xr.open_zarr(sys.argv[1], chunks=chunks) as data:
         assert dict(data.sizes) == dict(point=15, time=21, node=12, feature=8, quantity=15, field=7)
-        for name in ("P", "Q", "seed", "orientation", "flips", "epsilon", "b", "c", "delta"):
+        for name in "P Q seed orientation flips flip_set epsilon b c delta".split():
             assert data[name].dims == ("point",) and name in data.coords, name
             assert name in data.u.coords and name in data.ledger.coords
         for name, array in data.variables.items():
@@ -83,7 +83,19 @@ def test_zarr_lists_the_arrays_and_nothing_else(tmp_path: Path) -> None:
     store = make_store(tmp_path)
     store.start_run({})
     names = dict(zarr.open_group(store.path, mode="r").members())
-    coordinates = {"P", "Q", "seed", "orientation", "flips", "epsilon", "b", "c", "delta"}
+    coordinates = {
+        "P",
+        "Q",
+        "seed",
+        "orientation",
+        "flips",
+        "flip_set",
+        "epsilon",
+        "b",
+        "c",
+        "delta",
+    }
+    coordinates = set(store.points.columns)
     assert set(names) == {"u", "time", "features", "scalars", "ledger"} | coordinates
 
 

@@ -16,15 +16,17 @@ name = "small"
 model = "topological_fhn"
 [grid]
 P = "2:5"
-Q = "0:3"
-seeds = 4
+Q = "P"
+seeds = 16
 [fixed]
 n_nodes = 12
 [integrator]
 t_end = {t_end}
-t_step = 0.5
+t_step = 0.1
 [features]
-start = 10.0
+start = 40.0
+[reduction]
+figures = []
 [keep]
 series = "none"
 [run]
@@ -39,7 +41,7 @@ array = 4
 """
 
 
-def write_job(folder: Path, t_end: float = 20.0, block: int = 4) -> Path:
+def write_job(folder: Path, t_end: float = 100.0, block: int = 4) -> Path:
     """Write a job of 64 points."""
     path = folder / "small.toml"
     path.write_text(JOB.format(t_end=t_end, block=block))

@@ -157,7 +157,7 @@ class Slurm:
         text = self.sh("scontrol", "show", "job", job)
         return int(text.split("ExitCode=")[1].split(":")[0])
 
-    def wait(self, seconds: float = 60) -> None:
+    def wait(self, seconds: float = 100) -> None:
         """Wait until the queue is empty."""
         self.until(lambda: not self.queue(), seconds, "the queue did not become empty")
 

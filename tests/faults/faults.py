@@ -1,0 +1,488 @@
+"""The faults: each is one function of a trial that does the harm and lets the sweep recover.
+
+For developers: a fault is a function with one line of text, in `FAULTS`; it returns
+`trial.finding(allowed)`, where `allowed` is how many points may be computed again: a block for each
+process that was killed or stopped, and each damaged block.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from lab import BLOCK, LOCAL, N_BLOCKS, PATIENCE, SERIAL, Child, Finding, Point, Trial
+
+Fault = Callable[[Trial], Finding]
+FAULTS: dict[str, Fault] = {}
+BROKEN: Point = (3, 5)
+"""The point that is made to fail."""
+
+
+class Impossible(RuntimeError):
+    """This machine, or this user, does not allow the fault."""
+
+
+def fault(name: str) -> Callable[[Fault], Fault]:
+    """Register a fault."""
+
+    def register(function: Fault) -> Fault:
+        FAULTS[name] = function
+        return function
+
+    return register
+
+
+# Processes that die
+
+
+@fault("kill -9 of a worker")
+def kill_worker(trial: Trial) -> Finding:
+    child = trial.start_run(*LOCAL)
+    trial.wait_for_a_moment(child)
+    _kill(trial.random.sample(child.workers(), min(1, len(child.workers()))))
+    trial.ended(child, 0)
+    trial.resume()
+    return trial.finding(BLOCK)
+
+
+@fault("kill -9 of all workers")
+def kill_all_workers(trial: Trial) -> Finding:
+    child = trial.start_run(*LOCAL)
+    trial.wait_for_a_moment(child)
+    _kill(child.workers())
+    trial.ended(child, 0)
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+@fault("kill -9 of the driver")
+def kill_driver(trial: Trial) -> Finding:
+    child = trial.start_run(*trial.places)
+    trial.wait_for_a_moment(child)
+    child.signal(signal.SIGKILL)
+    trial.ended(child, (-9, 0))
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+@fault("SIGTERM")
+def terminate(trial: Trial) -> Finding:
+    child = trial.start_run(*trial.places)
+    trial.wait_for_a_moment(child)
+    child.signal(signal.SIGTERM)
+    trial.ended(child, (75, 0))
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+@fault("Ctrl-C once")
+def interrupt(trial: Trial) -> Finding:
+    child = trial.start_run(*trial.places)
+    trial.wait_for_a_moment(child)
+    child.signal_group(signal.SIGINT)
+    trial.ended(child, (130, 0))
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+@fault("Ctrl-C twice")
+def interrupt_twice(trial: Trial) -> Finding:
+    child = trial.start_run(*trial.places)
+    trial.wait_for_a_moment(child)
+    child.signal_group(signal.SIGINT)
+    time.sleep(trial.random.uniform(0, 0.1))
+    child.signal_group(signal.SIGINT)
+    trial.ended(child, (130, 0))
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+@fault("SIGSTOP of a worker, for ever")
+def hang_worker(trial: Trial) -> Finding:
+    child = trial.start_run(*LOCAL)
+    trial.wait_for_a_moment(child)
+    _signal(child.workers()[:1], signal.SIGSTOP)
+    trial.ended(child, 0)
+    trial.resume()
+    return trial.finding(BLOCK)
+
+
+@fault("SIGSTOP of a worker, late awakening")
+def hang_worker_for_a_while(trial: Trial) -> Finding:
+    child = trial.start_run(*LOCAL)
+    trial.wait_for_a_moment(child)
+    worker = child.workers()[:1]
+    _signal(worker, signal.SIGSTOP)
+    time.sleep(trial.random.uniform(0, 3 * PATIENCE))
+    _signal(worker, signal.SIGCONT)
+    trial.ended(child, 0)
+    trial.resume()
+    return trial.finding(BLOCK)
+
+
+@fault("SIGSTOP of a driver, late awakening")
+def hang_driver_for_a_while(trial: Trial) -> Finding:
+    first = trial.start_run(*SERIAL)
+    trial.wait_for_a_moment(first)
+    first.signal(signal.SIGSTOP)
+    second = trial.start_run(*SERIAL)
+    trial.ended(second, 0)
+    first.signal(signal.SIGCONT)
+    trial.ended(first, 0)
+    trial.resume()
+    return trial.finding(BLOCK)
+
+
+@fault("two drivers at once")
+def two_drivers(trial: Trial) -> Finding:
+    drivers = [trial.start_run(*SERIAL)]
+    time.sleep(trial.random.uniform(0, 0.5))
+    drivers.append(trial.start_run(*trial.places))
+    for driver in drivers:
+        trial.ended(driver, 0)
+    trial.resume()
+    return trial.finding(0)
+
+
+@fault("kill -9 of the scheduler")
+def kill_scheduler(trial: Trial) -> Finding:
+    file = trial.folder / "scheduler.json"
+    with _scheduler(trial, file) as first:
+        options = ("--cluster", "scheduler-file", "--scheduler-file", str(file))
+        child = trial.start_run(*options)
+        trial.wait_for_a_moment(child)
+        first[0].kill()
+        if trial.number % 2:
+            trial.ended(child, (75, 0))
+        else:
+            with _scheduler(trial, file):
+                trial.ended(child, 0)
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+# Points that misbehave
+
+
+@fault("a point that never ends")
+def never_ends(trial: Trial) -> Finding:
+    return _misbehave(trial, "forever", "integrator.time_out=0.5")
+
+
+@fault("a point that blows up")
+def blows_up(trial: Trial) -> Finding:
+    return _misbehave(trial, "blow-up")
+
+
+@fault("a point that kills its worker every time")
+def kills_its_worker(trial: Trial) -> Finding:
+    # Twice with its block, twice alone.
+    return _misbehave(trial, "kill", deaths=4)
+
+
+@fault("a point that needs more memory than there is")
+def hits_memory_limit(trial: Trial) -> Finding:
+    # Once with its block, twice alone.
+    return _misbehave(trial, "memory", options=("--memory", "700MB"), deaths=3)
+
+
+def _misbehave(
+    trial: Trial, kind: str, *settings: str, options: tuple[str, ...] = (), deaths: int = 0
+) -> Finding:
+    trouble = f"{kind}:{BROKEN[0]}:{BROKEN[1]}"
+    sets = [word for setting in settings for word in ("--set", setting)]
+    child = trial.start_run(*(LOCAL if deaths else SERIAL), *options, *sets, TROUBLE=trouble)
+    trial.ended(child, 1)
+    trial.expect_failures(child.text(), BROKEN)
+    status = {"kill": "worker lost", "memory": "out of memory"}.get(kind, "")
+    if status not in child.text():
+        trial.problems.append(f"not said to be {status}")
+    text = trial.resume(*sets, expect=1, TROUBLE=trouble)
+    trial.expect_failures(text, BROKEN)
+    return trial.finding(deaths * BLOCK, broken=(BROKEN,))
+
+
+# Disks
+
+
+@fault("disk full")
+def disk_full(trial: Trial) -> Finding:
+    with _mounted(trial.out, "-t", "tmpfs", "-o", "size=8m", "tmpfs"):
+        child = trial.start_run(*trial.places)
+        trial.wait_for_a_moment(child)
+        ballast = trial.out / "ballast"
+        with contextlib.suppress(OSError), ballast.open("wb", buffering=0) as file:
+            while True:
+                file.write(bytes(4096))
+        code = trial.ended(child, (75, 0))
+        if code == 75 and "No space left on device" not in child.text():
+            trial.problems.append(f"no clear line: {child.text()[-300:]}")
+        ballast.unlink()
+        trial.resume()
+        return trial.finding(2 * BLOCK)
+
+
+@fault("store read-only half-way")
+def read_only(trial: Trial) -> Finding:
+    child = trial.start_run(*trial.places)
+    trial.wait_for(trial.blocks_done, child)
+    with _mounted(trial.store, "--bind", str(trial.store)):
+        # Open files still lead to the folder below; the names lead to this mount.
+        trial.wait_for_a_moment(child)
+        _remount(trial, child)
+        code = trial.ended(child, (75, 0, 2))
+        if code and "Read-only file system" not in child.text():
+            trial.problems.append(f"no clear line: {child.text()[-300:]}")
+        # Nothing to be repaired there.
+        trial.run("status", trial.out, expect=0)
+    trial.resume()
+    return trial.finding(3 * BLOCK)
+
+
+# Damage
+
+
+@fault("a chunk cut short")
+def truncated(trial: Trial) -> Finding:
+    _copy_reference(trial)
+    chunk = _some_chunk(trial)
+    os.truncate(chunk, trial.random.randrange(chunk.stat().st_size))
+    trial.resume()
+    return trial.finding(BLOCK, was_whole=True)
+
+
+@fault("a byte flipped")
+def flipped(trial: Trial) -> Finding:
+    _copy_reference(trial)
+    chunk = _some_chunk(trial)
+    _flip(trial, chunk)
+    text = trial.run("verify", trial.out, "--stored", "--forget", expect=1)
+    if chunk.parent.name not in text:
+        trial.problems.append(f"{chunk} not named: {text}")
+    trial.resume()
+    return trial.finding(BLOCK, was_whole=True)
+
+
+@fault("a ledger chunk lost")
+def ledger_lost(trial: Trial) -> Finding:
+    _copy_reference(trial)
+    (trial.store / "ledger" / f"c.{trial.random.randrange(N_BLOCKS)}.0").unlink()
+    trial.resume()
+    return trial.finding(BLOCK, was_whole=True)
+
+
+@fault("partial files left over")
+def left_over(trial: Trial) -> Finding:
+    child = trial.start_run(*SERIAL)
+    trial.wait_for_a_moment(child)
+    child.signal(signal.SIGKILL)
+    trial.ended(child, (-9, 0))
+    mark = _mark_of_the_dead()
+    for folder in ("", "u", "features", "scalars", "ledger", "claims", "runs"):
+        (trial.store / folder / f".c.0.{mark}.0123abcd.partial").write_bytes(b"part")
+    (trial.out / f".store.zarr.{mark}.0123abcd.partial").mkdir()
+    trial.resume()
+    return trial.finding(BLOCK)
+
+
+@fault("attributes damaged")
+def attributes_damaged(trial: Trial) -> Finding:
+    _copy_reference(trial)
+    files = [trial.store / "zarr.json"] * 3
+    files += [trial.store / name / "zarr.json" for name in ("u", "features", "ledger", "seed")]
+    files += [trial.store / "seed" / "c.0", trial.store / "P" / "c.0"]
+    file = trial.random.choice(files)
+    harm = trial.random.randrange(4)
+    if harm == 0:
+        file.unlink()
+    elif harm == 1:
+        os.truncate(file, trial.random.randrange(file.stat().st_size))
+    elif harm == 2:
+        file.write_bytes(trial.random.randbytes(100))
+    else:
+        _flip(trial, file)
+    trial.resume()
+    if _metadata(trial.store) != _metadata(_reference_store(trial)):
+        trial.problems.append(f"{file}: the metadata are not those of before")
+    return trial.finding(0, was_whole=True)
+
+
+# Kills in the middle of other commands
+
+
+@fault("kill -9 during plan")
+def kill_plan(trial: Trial) -> Finding:
+    child = trial.start_run(*SERIAL)
+    folder = trial.wait_for(lambda: list(trial.folder.glob("sweep/.store*")), child)
+    time.sleep(trial.random.uniform(0, 0.15) if folder else 0)
+    child.signal(signal.SIGKILL)
+    trial.ended(child, -9)
+    trial.resume()
+    return trial.finding(BLOCK)
+
+
+@fault("kill -9 during extend")
+def kill_extend(trial: Trial) -> Finding:
+    trial.resume("--set", "seeds=6")
+    extend = ("extend", trial.job, "--out", trial.out)
+    child = trial.start(*extend)
+    claim = trial.store / "claims" / "metadata.1.json"
+    trial.wait_for(claim.exists, child)
+    time.sleep(trial.random.uniform(0, 0.2))
+    child.signal(signal.SIGKILL)
+    trial.ended(child, (-9, 0))
+    trial.run(*extend)
+    trial.resume()
+    return trial.finding(0)
+
+
+@fault("kill -9 during merge")
+def kill_merge(trial: Trial) -> Finding:
+    parts = []
+    for name, seeds in (("first", "[0,1,2,3,4]"), ("second", "[3,4,5,6,7]")):
+        parts.append(trial.folder / name)
+        run = ("run", trial.job, "--out", parts[-1], "--no-figures", *SERIAL)
+        trial.run(*run, "--set", f"seeds={seeds}", TROUBLE_LOG="")
+    merge = ("merge", *parts, "--out", trial.out)
+    child = trial.start(*merge)
+    trial.wait_for(lambda: list(trial.folder.glob("sweep/.store*")), child)
+    time.sleep(trial.random.uniform(0, 0.3))
+    child.signal(signal.SIGKILL)
+    trial.ended(child, (-9, 0))
+    if not trial.store.exists():
+        trial.run(*merge)
+    trial.run("reduce", trial.out, "--no-figures")
+    trial.run("verify", trial.out, "--stored")
+    return trial.finding(0)
+
+
+@fault("kill -9 during reduce")
+def kill_reduce(trial: Trial) -> Finding:
+    _copy_reference(trial)
+    wanted = (trial.out / "results.json").read_bytes()
+    child = trial.start("reduce", trial.out, "--no-figures")
+    claim = trial.store / "claims" / "metadata.1.json"
+    trial.wait_for(claim.exists, child)
+    time.sleep(trial.random.uniform(0, 0.15))
+    child.signal(signal.SIGKILL)
+    trial.ended(child, (-9, 0))
+    trial.run("reduce", trial.out, "--no-figures")
+    if (trial.out / "results.json").read_bytes() != wanted:
+        trial.problems.append("another results.json")
+    trial.resume()
+    return trial.finding(0, was_whole=True)
+
+
+def _kill(pids: list[int]) -> None:
+    _signal(pids, signal.SIGKILL)
+
+
+def _signal(pids: list[int], number: int) -> None:
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
+
+
+def _reference_store(trial: Trial) -> Path:
+    return trial.folder.parent / "reference" / "sweep" / "store.zarr"
+
+
+def _copy_reference(trial: Trial) -> None:
+    """Begin with the folder of the undisturbed run."""
+    shutil.copytree(_reference_store(trial).parent, trial.out)
+
+
+def _some_chunk(trial: Trial) -> Path:
+    array = trial.random.choice(["u", "features", "scalars", "ledger"])
+    return trial.random.choice(sorted((trial.store / array).glob("c.*")))
+
+
+def _flip(trial: Trial, file: Path) -> None:
+    data = bytearray(file.read_bytes())
+    data[trial.random.randrange(len(data))] ^= 1 << trial.random.randrange(8)
+    file.write_bytes(data)
+
+
+def _metadata(store: Path) -> dict[str, Any]:
+    """Return what the files say that tell what the store is."""
+    names = ["zarr.json", *(f"{n}/zarr.json" for n in ("u", "features", "ledger", "seed", "P"))]
+    return {name: json.loads((store / name).read_bytes()) for name in names}
+
+
+def _mark_of_the_dead() -> str:
+    """Return the mark of a process of this machine that is gone."""
+    from chimera_hpc.processes import process_mark
+
+    machine, _, rest = process_mark().partition("-")
+    return f"{machine}-{os.getpid()}-{int(rest.partition('-')[2]) + 1}"
+
+
+@contextmanager
+def _mounted(folder: Path, *how: str) -> Iterator[None]:
+    """Mount something at a folder."""
+    if os.geteuid() != 0 or shutil.which("mount") is None:
+        raise Impossible("only root may mount")
+    folder.mkdir(exist_ok=True)
+    done = subprocess.run(["mount", *how, str(folder)], capture_output=True, check=False)
+    if done.returncode:
+        raise Impossible(done.stderr.decode().strip())
+    try:
+        yield
+    finally:
+        for _ in range(100):
+            if subprocess.run(["umount", str(folder)], capture_output=True, check=False).returncode:
+                time.sleep(0.05)
+            else:
+                break
+
+
+def _remount(trial: Trial, child: Child) -> None:
+    """Make the mount at the store read-only as soon as no file in it is open for writing."""
+    command = ["mount", "-o", "remount,ro,bind", str(trial.store)]
+    for _ in range(2000):
+        if subprocess.run(command, capture_output=True, check=False).returncode == 0:
+            return
+        if child.poll() is not None:
+            return
+    trial.problems.append("could not be made read-only")
+
+
+@contextmanager
+def _scheduler(trial: Trial, file: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Run a Dask scheduler and two workers, as `dask scheduler` and `dask worker` do."""
+    file.unlink(missing_ok=True)
+    module = [sys.executable, "-m", "distributed.cli"]
+    log = (trial.folder / "dask.txt").open("ab")
+    scheduler = f"{module[2]}.dask_scheduler", "--host", "127.0.0.1", "--port", "0"
+    worker = f"{module[2]}.dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard"
+    options = ("--no-dashboard", "--scheduler-file", str(file))
+    environment = os.environ | {"TROUBLE_LOG": str(trial.log), "TROUBLE_SECONDS": "0.03"}
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def start(*words: str) -> None:
+        command = [*module[:2], *words]
+        processes.append(
+            subprocess.Popen(command, stdout=log, stderr=log, env=environment, cwd=trial.folder)
+        )
+
+    try:
+        start(*scheduler, *options)
+        trial.wait_for(file.exists)
+        for _ in range(2):
+            start(*worker, "--scheduler-file", str(file))
+        yield processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+        log.close()

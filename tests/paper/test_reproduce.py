@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from chimera_hpc.paper.claims import read_claims
+from chimera_hpc.paper.reproduce import main
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_an_unknown_job_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--only", "diagonals", "--out", str(tmp_path)]) == 2
+    assert "diagonals: not a job of the paper" in capsys.readouterr().err
+
+
+def test_judging_an_empty_folder_writes_a_scoreboard(tmp_path: Path) -> None:
+    assert main(["--only", "none", "--out", str(tmp_path)]) == 0
+    rows = json.loads((tmp_path / "results.json").read_text())["claims"]
+    assert len(rows) >= 40
+    assert (tmp_path / "claims.md").read_text().count("not decidable") >= 40
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_the_thinned_reproduction_ends_well_and_keeps_the_claims_that_survive(
+    tmp_path: Path,
+) -> None:
+    command = [sys.executable, "-P", "-m", "chimera_hpc.paper.reproduce", "--quick"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(
+        [*command, "--out", str(tmp_path), "--workers", "2"],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    results = json.loads((tmp_path / "results.json").read_text())
+    outcome = {row["id"]: (row["outcome"], row["measured"]) for row in results["claims"]}
+    wanted = [claim.id for claim in read_claims(ROOT / "jobs/paper/claims.toml") if claim.quick]
+    lost = {name: outcome[name] for name in wanted if outcome[name][0] != "reproduced"}
+    assert len(wanted) >= 20
+    assert lost == {}
+    assert results["audit"]["diagonal"]["points"] >= 1
+    assert "Audit of the labels" in (tmp_path / "claims.md").read_text()
