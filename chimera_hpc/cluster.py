@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import signal
@@ -112,17 +113,15 @@ def local_cluster(
 
 @contextmanager
 def existing_cluster(scheduler_file: Path, *, patience: float = 60.0) -> Iterator[Client]:
-    """Connect to a scheduler that is running already, by the file it wrote.
+    """Connect to a scheduler that is running already, or will be, by the file it writes.
 
     Raises
     ------
     BadInput
-        When the file is missing or the scheduler does not answer within ``patience`` seconds.
+        When no scheduler answers within ``patience`` seconds.
     """
     import dask
 
-    if not scheduler_file.is_file():
-        raise BadInput(f"{scheduler_file}: no such file; dask scheduler --scheduler-file makes it")
     with dask.config.set(settings(patience)), _connected(scheduler_file, patience) as client:
         _prepare(client)
         yield client
@@ -135,8 +134,9 @@ def _connected(scheduler_file: Path, patience: float) -> Client:
     while True:
         # Each try reads the file anew: another scheduler may have been started meanwhile.
         try:
-            return Client(scheduler_file=str(scheduler_file), timeout=min(patience, 5.0))
-        except (OSError, TimeoutError, ValueError) as error:
+            address = json.loads(scheduler_file.read_bytes())["address"]
+            return Client(address, timeout=min(patience, 5.0))
+        except (OSError, TimeoutError, ValueError, LookupError, TypeError) as error:
             if time.monotonic() > deadline:
                 text = f"{scheduler_file}: its scheduler does not answer: {error}"
                 raise BadInput(text) from None
@@ -163,6 +163,9 @@ def _quiet_tracker() -> Iterator[None]:
 def _prepare(client: Client) -> None:
     from chimera_hpc.worker import Manners
 
+    # What goes wrong is said by the run, on one line.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     client.register_plugin(Manners())
 
 

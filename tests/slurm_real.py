@@ -136,7 +136,7 @@ class Slurm:
         """Run a command with this SLURM's configuration and return what it printed."""
         done = subprocess.run(
             command,
-            env=self.environment | {k: v for k, v in os.environ.items() if k == "PATH"},
+            env=self.environment | {k: os.environ[k] for k in _PASSED if k in os.environ},
             capture_output=True,
             text=True,
             timeout=60,
@@ -184,6 +184,10 @@ class Slurm:
                 daemon.kill()
                 daemon.wait()
         shutil.rmtree(self.dir, ignore_errors=True)
+
+
+_PASSED = ("PATH", "PYTHONPATH", "NUMBA_CACHE_DIR")
+"""Variables that a test may change after the start."""
 
 
 def _free_ports(n: int) -> list[int]:

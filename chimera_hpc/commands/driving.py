@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 CLUSTERS = ("serial", "local", "scheduler-file", "slurm", "allocation")
 _CLUSTER_TRIES = 3
+"""Times that a cluster may be lost before a block is done."""
 _BLOCK_TRIES = 3
 """Errors of the operating system after which a block is put aside."""
 _HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
@@ -161,8 +162,8 @@ class Driver:
     def _on_cluster(self, orders: Orders) -> None:
         from chimera_hpc.execute import ClusterLost, run_dask
 
-        patience = self.store.sweep.run.patience
-        for attempt in range(_CLUSTER_TRIES):
+        patience, losses, done = self.store.sweep.run.patience, 0, self.reporter.done
+        while losses < _CLUSTER_TRIES:
             try:
                 with self._cluster(patience) as client:
                     for blocks in self._rounds():
@@ -173,13 +174,16 @@ class Driver:
                         )
                 return
             except ClusterLost as error:
-                self.reporter.say(f"{error}: lost the cluster, {attempt + 1} of {_CLUSTER_TRIES}")
-                if self.stop():
-                    return
+                losses = 1 if self.reporter.done > done else losses + 1
+                reason = str(error)
             except BadInput as error:
-                if attempt == 0:
+                if not losses:
                     raise
-                self.reporter.say(str(error))
+                losses, reason = losses + 1, str(error)
+            done = self.reporter.done
+            self.reporter.say(f"the cluster is lost ({reason}), {losses} of {_CLUSTER_TRIES} times")
+            if self.stop():
+                return
         self.ended_by = "the cluster was lost again and again"
 
     @contextmanager

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 _LOOK_SECONDS = 3.0
 _LONGEST_LOOK = 30.0
+_BOOKS_SECONDS = 0.5
 Say = Callable[[str], None]
 
 
@@ -86,7 +87,8 @@ class Keeper(threading.Thread):
             self._lost = 0
         if there >= self.wanted:
             return True
-        mine = list(self.cluster.workers.items())
+        wished = set(self.cluster.worker_spec)
+        mine = [(n, job) for n, job in list(self.cluster.workers.items()) if n in wished]
         queued = {job.id: job for job in queue.jobs(self.name_of_jobs)}
         refused = [job.refused for _, job in mine if job.refused]
         dead = [n for n, job in mine if job.refused or (job.job_id and job.job_id not in queued)]
@@ -98,7 +100,7 @@ class Keeper(threading.Thread):
             self._tell(refused[0])
         if dead:
             self._lost += len(dead)
-            self.say(f"{len(dead)} worker jobs have ended and are replaced")
+            self.say(f"worker jobs that have ended are replaced: {len(dead)}")
             self.cluster.loop.add_callback(self._replace, dead)
         if self._lost > 2 * self.wanted + 2:
             self.failure = f"{self._lost} worker jobs ended without a worker; see {self.logs}"
@@ -108,6 +110,11 @@ class Keeper(threading.Thread):
         """Forget dead jobs and submit others; in the event loop's own thread."""
         for name in dead:
             self.cluster.worker_spec.pop(name, None)
+        # Dask gives a free name again: the dead must be gone from its books before that.
+        self.cluster.scale(jobs=len(self.cluster.worker_spec))
+        self.cluster.loop.call_later(_BOOKS_SECONDS, self._fill_up)
+
+    def _fill_up(self) -> None:
         if not self._over.is_set():
             self.cluster.scale(jobs=self.wanted)
 

@@ -61,7 +61,10 @@ def main() -> int:
     _import_everything(folder)
     reference = _reference(folder)
     rows = [_row(name, folder, reference, args) for name in names]
-    shutil.rmtree(folder, ignore_errors=True)
+    if all(row.good for row in rows):
+        shutil.rmtree(folder, ignore_errors=True)
+    else:
+        print(f"the folders of the trials that went wrong are in {folder}")
     print(table(rows))
     if args.json:
         args.json.write_text(json.dumps([asdict(row) | {"good": row.good} for row in rows]))

@@ -159,7 +159,8 @@ def kill_scheduler(trial: Trial) -> Finding:
     file = trial.folder / "scheduler.json"
     with _scheduler(trial, file) as first:
         options = ("--cluster", "scheduler-file", "--scheduler-file", str(file))
-        child = trial.start_run(*options)
+        # Time enough for another scheduler to start.
+        child = trial.start_run(*options, "--set", "run.patience=8")
         trial.wait_for_a_moment(child)
         first[0].kill()
         if trial.number % 2:

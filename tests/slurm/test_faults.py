@@ -52,8 +52,8 @@ def worker_jobs(slurm: Slurm) -> list[str]:
     return [number for number, state, _ in slurm.queue() if state == "RUNNING"]
 
 
-def cancel_one(slurm: Slurm) -> None:
-    slurm.sh("scancel", worker_jobs(slurm)[0])
+def cancel_all(slurm: Slurm) -> None:
+    slurm.sh("scancel", *worker_jobs(slurm))
 
 
 def requeue_one(slurm: Slurm) -> None:
@@ -65,7 +65,7 @@ def node_down(slurm: Slurm) -> None:
     slurm.sh("scontrol", "update", f"nodename={node}", "state=down", "reason=test")
 
 
-@pytest.mark.parametrize("strike", [cancel_one, requeue_one, node_down])
+@pytest.mark.parametrize("strike", [cancel_all, requeue_one, node_down])
 def test_a_lost_worker_costs_its_blocks_only(
     strike: Callable[[Slurm], None], slurm: Slurm, tmp_path: Path
 ) -> None:

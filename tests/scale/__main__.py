@@ -1,0 +1,215 @@
+"""The bookkeeping of large sweeps, measured with points that cost nothing.
+
+``scripts/scale`` prints the table; it takes some minutes and about 4 GB of disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+FOLDER = Path(__file__).parent
+JOB = """
+name = "scale"
+model = "topological_fhn"
+[grid]
+P = "2:11"
+Q = "P"
+epsilon = {{ linspace = [0.01, 0.1, {values}] }}
+seeds = 1000
+[keep]
+series = "none"
+[run]
+block = 300
+"""
+SMALL, LARGE = 100_000, 1_000_000
+MB = 1e6
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the table."""
+
+    what: str
+    measured: float
+    unit: str
+    limit: float
+    at_least: bool = False
+
+    @property
+    def good(self) -> bool:
+        return self.measured >= self.limit if self.at_least else self.measured <= self.limit
+
+    def words(self) -> list[str]:
+        sign = ">=" if self.at_least else "<="
+        return [self.what, f"{self.measured:.3g} {self.unit}", f"{sign} {self.limit:g} {self.unit}"]
+
+
+def main() -> int:
+    """Measure, print the table; 1 when a limit is not held."""
+    parser = argparse.ArgumentParser(prog="scripts/scale", description=__doc__.splitlines()[0])
+    parser.add_argument("--folder", type=Path, help="where to work (default: a temporary folder)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the table here too")
+    parser.add_argument("--points", type=int, default=LARGE, help="points of the large sweep")
+    args = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="chimera-scale-", dir=args.folder))
+    try:
+        lines = measure(folder, args.points)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    print(table(lines))
+    if args.json:
+        args.json.write_text(json.dumps([line.words() for line in lines]))
+    return 0 if all(line.good for line in lines) else 1
+
+
+def measure(folder: Path, n_points: int) -> list[Line]:
+    """Return all lines of the table."""
+    small, large = plan(folder, "small", SMALL), plan(folder, "large", n_points)
+    lines = [
+        Line(f"plan of {n_points:.0e} points: time", large.seconds, "s", 15),
+        Line(f"plan of {n_points:.0e} points: memory", large.memory / MB, "MB", 1000),
+    ]
+    lines.append(
+        Line("blocks of 300 points, one writer", serial_rate(folder), "a second", 50, True)
+    )
+    memory = [scheduler_memory(folder, store.path) for store in (small, large)]
+    growth = (memory[1] - memory[0]) / MB
+    what = f"growth of the scheduler's memory, {SMALL:.0e} to {n_points:.0e} points"
+    lines.append(Line(what, growth, "MB", 50))
+    n_files = sum(len(files) for _, _, files in os.walk(large.path))
+    blocks = -(-n_points // 300)
+    lines.append(Line(f"files of {blocks} blocks", n_files, "files", 5 * blocks + 200))
+    done = run("-m", "chimera_hpc.sweep", "status", large.path.parent, "--json")
+    state = json.loads(done.text)
+    assert state["done"] == n_points, state
+    lines.append(Line(f"status of {n_points:.0e} points: time", done.seconds, "s", 1))
+    lines.append(Line(f"status of {n_points:.0e} points: memory", done.memory / MB, "MB", 1000))
+    return lines
+
+
+def table(lines: list[Line]) -> str:
+    """Return the table as Markdown."""
+    rows = [["measured", "value", "limit"], ["---"] * 3, *(line.words() for line in lines)]
+    widths = [max(len(row[k]) for row in rows) for k in range(3)]
+    return "\n".join(
+        "| " + " | ".join(w.ljust(n) for w, n in zip(row, widths, strict=True)) + " |"
+        for row in rows
+    )
+
+
+@dataclass(frozen=True)
+class Done:
+    """A command that has ended."""
+
+    seconds: float
+    memory: int
+    """Most bytes that it occupied."""
+    text: str
+    path: Path = Path()
+
+
+def run(*arguments: object) -> Done:
+    """Run Python with these arguments, and measure it."""
+    began = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    text = process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    seconds = time.perf_counter() - began
+    if process.returncode:
+        raise SystemExit(f"{arguments} ended with {process.returncode}: {text}")
+    return Done(seconds, usage.ru_maxrss * 1024, text)
+
+
+def plan(folder: Path, name: str, n_points: int) -> Done:
+    """Plan the store of a sweep, as `run` does before it begins."""
+    job, path = folder / f"{name}.toml", folder / name / "store.zarr"
+    job.write_text(JOB.format(values=n_points // 10_000))
+    program = "from sys import argv; from chimera_hpc.grid import Sweep; "
+    program += "from chimera_hpc.store import Store; Store.plan(argv[2], Sweep.load(argv[1]))"
+    done = run("-c", program, job, path)
+    return Done(done.seconds, done.memory, done.text, path)
+
+
+def serial_rate(folder: Path) -> float:
+    """Return how many blocks one process writes in a second."""
+    sys.path.insert(0, str(FOLDER))
+    import nothing  # noqa: F401
+
+    from chimera_hpc.store import Store
+    from chimera_hpc.work import Orders, do_block
+
+    path = plan(folder, "serial", SMALL).path
+    orders, n_blocks = Orders(path, 1), Store.open(path).n_blocks
+    began = time.perf_counter()
+    receipts = [do_block(orders, block) for block in range(n_blocks)]
+    seconds = time.perf_counter() - began
+    assert sum(receipt.n_done for receipt in receipts) == SMALL
+    shutil.rmtree(path)
+    return n_blocks / seconds
+
+
+def scheduler_memory(folder: Path, path: Path) -> int:
+    """Do a whole sweep over a scheduler of its own; return the bytes that it occupies then."""
+    from distributed import Client
+
+    from chimera_hpc.execute import run_dask
+    from chimera_hpc.store import Store
+    from chimera_hpc.work import Orders
+
+    store = Store.open(path)
+    done = []
+    with _dask(folder) as (scheduler, address), Client(address) as client:
+        blocks = range(store.n_blocks)
+        never: Callable[[], bool] = lambda: False  # noqa: E731
+        run_dask(client, Orders(path, 1), blocks, lambda r: done.append(r.n_done), never)
+        memory: int = psutil.Process(scheduler.pid).memory_info().rss
+    assert sum(done) == store.n_points
+    return memory
+
+
+@contextmanager
+def _dask(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """Run a scheduler and two workers, each a process of its own."""
+    file = folder / "scheduler.json"
+    file.unlink(missing_ok=True)
+    log = (folder / "dask.txt").open("ab")
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def start(*words: str) -> None:
+        command = [sys.executable, "-m", *words, "--no-dashboard", "--scheduler-file", str(file)]
+        processes.append(subprocess.Popen(command, stdout=log, stderr=log))
+
+    try:
+        start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0")
+        while not file.exists():
+            time.sleep(0.05)
+        preload = ("--preload", str(FOLDER / "nothing.py"), "--local-directory", str(folder))
+        for _ in range(2):
+            start("distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *preload)
+        yield processes[0], json.loads(file.read_text())["address"]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+        log.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
