@@ -143,7 +143,8 @@ def claim_block(
     token = uuid.uuid4().hex
     path = _path(folder, block, attempt)
     content = _content(block, run, attempt, token, expiry, note)
-    if not create_exclusively(path, content):
+    # No process outlasts a loss of power, so its claims need not either.
+    if not create_exclusively(path, content, durable=False):
         return None
     if max(_attempts(folder, block), default=attempt) > attempt:
         # The listing above was behind the times: the block had gone through other hands meanwhile.

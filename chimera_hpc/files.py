@@ -48,8 +48,10 @@ def write_together(contents: Sequence[tuple[Path, bytes]]) -> None:
         sync_folder(folder)
 
 
-def create_exclusively(path: Path, data: bytes) -> bool:
+def create_exclusively(path: Path, data: bytes, *, durable: bool = True) -> bool:
     """Create `path` with `data` unless it exists; return whether this call created it.
+
+    Unless `durable`, it need not outlast a loss of power.
 
     The contents are linked into place whole, so that no reader ever finds the file empty; and a
     link is made or refused by the file server itself, also on network file systems where an
@@ -58,7 +60,8 @@ def create_exclusively(path: Path, data: bytes) -> bool:
     the truth. Where hard links are not offered the file is opened exclusively.
     """
     with _written(path, data) as (temporary, _):
-        _flush(temporary)
+        if durable:
+            _flush(temporary)
         try:
             os.link(temporary, path)
         except FileExistsError:
@@ -69,7 +72,8 @@ def create_exclusively(path: Path, data: bytes) -> bool:
             created = _open_exclusively(path, data)
         else:
             created = True
-    sync_folder(path.parent)
+    if durable:
+        sync_folder(path.parent)
     return created
 
 

@@ -87,6 +87,12 @@ def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
         if exists:
             return Store.open(path).adopt(sweep)
         folder.mkdir(parents=True, exist_ok=True)
-        return Store.plan(path, sweep)
+        try:
+            return Store.plan(path, sweep)
+        except BadInput:
+            if not path.exists():
+                raise
+            # Another driver planned it in this very moment.
+            return Store.open(path).adopt(sweep)
     except OSError as error:
         raise BadInput(f"{folder}: can't be written: {error.strerror or error}") from None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.reduce.atlas import Atlas
+from chimera_hpc.reduce.results import read_results
 from chimera_hpc.store import Store
 from chimera_hpc.store.labelled import STORE_NAME
 
@@ -58,7 +58,7 @@ def curves_beside(
     found = {}
     for name in names:
         try:
-            found[name] = json.loads((sibling(folder, name) / "results.json").read_text())["curves"]
-        except (OSError, ValueError, KeyError) as error:
+            found[name] = read_results(sibling(folder, name) / "results.json")["curves"]
+        except BadInput as error:
             say(f"beside {name}: {error}")
     return found

@@ -161,11 +161,10 @@ def compare(before: Sequence[str], after: Sequence[str]) -> dict[str, Any]:
 
 def bootstrap_cells(folder: Path, rng: np.random.Generator) -> dict[str, Any]:
     """Resample the seeds of every cell: how often the modal class stays what it is."""
-    import json
-
     from chimera_hpc.paper.evidence import family_of
+    from chimera_hpc.reduce.results import read_results
 
-    results = json.loads((folder / "results.json").read_text())
+    results = read_results(folder / "results.json")
     cut = next(iter(results["cuts"].values()))
     size = {cluster["name"]: cluster["size"] for cluster in cut["clusters"]}
     stays = []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from chimera_hpc.reduce.results import read_results
 
 Cell = Mapping[str, Any]
 
@@ -25,11 +26,10 @@ class Evidence:
     def job(self, name: str) -> dict[str, Any]:
         """Return results.json of a job; Missing when there is none, or points are pending."""
         if name not in self._known:
-            try:
-                text = (self.folder / name / "results.json").read_text()
-            except OSError:
-                raise Missing(f"the job {name} has not been run") from None
-            self._known[name] = json.loads(text)
+            path = self.folder / name / "results.json"
+            if not path.exists():
+                raise Missing(f"the job {name} has not been run")
+            self._known[name] = read_results(path)
         found = self._known[name]
         if found["points"]["pending"]:
             raise Missing(f"the job {name} is not finished")

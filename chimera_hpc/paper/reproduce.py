@@ -139,7 +139,7 @@ def write_scoreboard(
     if not audit:  # a later call that only judges keeps the audit there is
         try:
             audit = json.loads((folder / "results.json").read_text())["audit"]
-        except (OSError, ValueError, KeyError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             audit = {}
     results = {"schema": 1, "quick": quick, "claims": rows, "audit": audit, "seconds": seconds}
     write_atomically(folder / "results.json", to_json(results).encode())

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from chimera_hpc.errors import BadInput
 from chimera_hpc.reduce.classify import Classification, Cut
 from chimera_hpc.reduce.modes import CellTable, modal_classes
 from chimera_hpc.status import Status
@@ -113,6 +116,67 @@ def json_safe(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def read_results(path: str | Path) -> dict[str, Any]:
+    """Return the contents of a results.json.
+
+    Raises
+    ------
+    BadInput
+        When it is missing, or something else than this module writes.
+    """
+    try:
+        results = json.loads(Path(path).read_bytes())
+        _Results.model_validate(results)
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror or error}") from None
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"])) or "all of it"
+        raise BadInput(f"{path}: no results of a sweep: {place[:100]!r}: {first['msg']}") from None
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: no results of a sweep: {error}") from None
+    return dict(results)
+
+
+class _Part(BaseModel):
+    """A part of results.json as far as readers rely on it."""
+
+    model_config = ConfigDict(strict=True, extra="allow", defer_build=True)
+
+
+class _Cluster(_Part):
+    name: str
+    size: int = Field(ge=0)
+
+
+class _Cell(_Part):
+    modal_class: str | None = Field(alias="class")
+    votes: dict[str, Annotated[int, Field(ge=0)]]
+
+
+class _Cut(_Part):
+    clusters: list[_Cluster]
+    cells: list[_Cell]
+
+
+class _Points(_Part):
+    total: int
+    done: int
+    steady: int
+    no_window: int
+    failed: int
+    pending: int
+
+
+class _Results(_Part):
+    version: Literal[1] = Field(alias="schema")
+    sweep: str
+    points: _Points
+    cuts: dict[str, _Cut]
+    curves: dict[str, Any]
+    claims: list[dict[str, Any]]
 
 
 def to_json(results: Mapping[str, Any]) -> str:

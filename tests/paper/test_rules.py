@@ -12,6 +12,8 @@ from chimera_hpc.paper.audit import compare, labels_of, modal_stays, variants
 from chimera_hpc.paper.evidence import Evidence, Missing, family_of, select, wanted
 from chimera_hpc.paper.rules import NOT_REPRODUCED, REPRODUCED, RULES
 
+COUNTS = ("total", "done", "steady", "no_window", "failed", "pending")
+
 
 @pytest.fixture
 def evidence(tmp_path: Path):
@@ -20,8 +22,9 @@ def evidence(tmp_path: Path):
     def make(**jobs: Any) -> Evidence:
         for name, results in jobs.items():
             (tmp_path / name).mkdir()
-            text = json.dumps({"points": {"pending": 0}} | results)
-            (tmp_path / name / "results.json").write_text(text)
+            whole = {"schema": 1, "sweep": name, "cuts": {}, "curves": {}, "claims": []} | results
+            whole["points"] = dict.fromkeys(COUNTS, 0) | results.get("points", {})
+            (tmp_path / name / "results.json").write_text(json.dumps(whole))
         return Evidence(tmp_path)
 
     return make
