@@ -166,7 +166,12 @@ def _prepare(client: Client) -> None:
     # What goes wrong is said by the run, on one line.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    client.register_plugin(Manners())
+    try:
+        client.register_plugin(Manners())
+    except Exception as error:
+        # Workers that somebody else has started: they may lack anything.
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        raise BadInput(f"the workers cannot use this package: {text}") from None
 
 
 def _kill_workers(cluster: LocalCluster) -> None:

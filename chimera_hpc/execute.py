@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING
 
-from chimera_hpc.work import BlockReceipt, Orders, do_block
+from chimera_hpc.work import BlockReceipt, Orders, Trouble, do_block
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -111,7 +111,7 @@ class _Window:
                 tell_to_stop(self.orders)
             for future in self.take_landed():
                 block = self.flying.pop(future)
-                receipt = self.receipt(future)
+                receipt = self.receipt(future, block)
                 if receipt is not None:
                     on_receipt(receipt)
                 elif stopping is None:
@@ -151,7 +151,7 @@ class _Window:
         except queue.Empty:
             return ended
 
-    def receipt(self, future: Future[BlockReceipt]) -> BlockReceipt | None:
+    def receipt(self, future: Future[BlockReceipt], block: int) -> BlockReceipt | None:
         """Return the receipt of a block, or None when its worker died."""
         from distributed.scheduler import KilledWorker
 
@@ -165,7 +165,8 @@ class _Window:
             raise ClusterLost("the scheduler is gone") from None
         if isinstance(error, KilledWorker):
             return None
-        raise error
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        return BlockReceipt(block, trouble=Trouble(text, text))
 
     def look_after(self) -> None:
         """Count the workers from time to time, and see to it that there are any."""

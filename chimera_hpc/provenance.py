@@ -66,7 +66,7 @@ def gather() -> dict[str, Any]:
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """Return a line for each thing that may change numbers and differs between two runs."""
     lines = []
-    for key in ("package", "source", "python", "libraries"):
+    for key in ("package", "source", "model", "python", "libraries"):
         lines += _lines(key, before.get(key), now.get(key))
     cpus = [dict(run.get("machine") or {}).get("cpu") for run in (before, now)]
     return lines + _lines("cpu", *cpus)
@@ -110,6 +110,16 @@ def cpu_model() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
+
+
+def model_source(model: str) -> dict[str, str]:
+    """Return what to record of a user's model, `package.module:object`; nothing of another one."""
+    module = sys.modules.get(model.partition(":")[0])
+    path = getattr(module, "__file__", None)
+    if ":" not in model or path is None:
+        return {}
+    digest = blake2b(Path(path).read_bytes(), digest_size=8).hexdigest()
+    return {"model": f"{model}, source {digest}"}
 
 
 def _lines(key: str, before: object, now: object) -> list[str]:

@@ -208,7 +208,7 @@ class _Block:
             self.n_done,
             self.n_failed,
             time.perf_counter() - began,
-            stopped=not whole and self.trouble is None,
+            stopped=not whole,
             late=not whole and walltime.time_to_leave(),
             trouble=self.trouble,
             machine=_machine(),
@@ -239,7 +239,7 @@ class _Block:
             _in_hand.remove(claim)
 
     def _work(self, claim: Claim) -> bool:
-        """Do what is to do; return whether all of it was done."""
+        """Do what is to do; return whether all of it was reached."""
         again = self.orders.again
         rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
         together, alone = _tries_together(self._deaths(claim))
@@ -256,7 +256,7 @@ class _Block:
             self._write(claim, result, tries, group)
             if self.stop() and (result.status == Status.NEVER).any():
                 return False
-        return self.trouble is None
+        return True
 
     def _write(self, claim: Claim, result: BlockResult, tries: int, rows: Rows) -> None:
         receipt = self.store.write_block(self.block, result, self.orders.run, tries, claim, rows)

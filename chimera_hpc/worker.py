@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from pathlib import Path
 from types import FrameType
@@ -39,10 +40,10 @@ class Manners(WorkerPlugin):
         limit = getattr(worker.memory_manager, "memory_limit", None)
 
         def end(number: int, frame: FrameType | None) -> None:
-            if limit and resident_bytes() > _NEARLY * limit:
-                from chimera_hpc.work import blame_memory
-
-                blame_memory()
+            # Before the first block that module is not there, or not whole.
+            blame = getattr(sys.modules.get("chimera_hpc.work"), "blame_memory", None)
+            if limit and blame is not None and resident_bytes() > _NEARLY * limit:
+                blame()
             elif "SLURM_JOB_ID" in os.environ:
                 # A cancelled, preempted or requeued job, or its time limit.
                 _drop_work()

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import errno
-import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.claims import live_claims
 from chimera_hpc.commands.stopping import StopRequest
 from chimera_hpc.errors import BadInput
-from chimera_hpc.files import write_atomically
 from chimera_hpc.ledger import RESULTS, unfinished
 from chimera_hpc.processes import process_mark
 from chimera_hpc.progress import Reporter
-from chimera_hpc.provenance import differences, gather
+from chimera_hpc.provenance import differences, gather, model_source
 from chimera_hpc.slurm.walltime import NEAR, time_to_leave
 from chimera_hpc.status import Status
 
@@ -132,6 +131,7 @@ class Driver:
             self.ended_by = f"{error.strerror or error}" + f" ({error.filename})"
         finally:
             _remove(orders.stop_file)
+            self._record(orders)
 
     def _start(self, n_blocks: int) -> Orders:
         """Record the run, and compile what it needs."""
@@ -139,7 +139,7 @@ class Driver:
         from chimera_hpc.work import Orders
 
         store, say = self.store, self.reporter.say
-        info = gather()
+        info = {**gather(), **model_source(store.sweep.model)}
         for line in changes(store, info, self.strict):
             say(line)
         run = store.start_run({**info, "cluster": self.place.kind})
@@ -253,7 +253,7 @@ class Driver:
         """Take a receipt to the books."""
         if receipt.machine and receipt.machine not in self._machines:
             self._machines.append(receipt.machine)
-            record_machines(orders, self._machines)
+            self._record(orders)
         if receipt.trouble is not None:
             self._note_trouble(receipt.block, receipt.trouble)
         # A worker that is a job of its own is followed by another one.
@@ -264,6 +264,17 @@ class Driver:
                 f"{receipt.seconds:.2f} s"
             )
             self.reporter.add(receipt.n_done, receipt.n_failed, receipt.seconds)
+
+    def _record(self, orders: Orders) -> None:
+        """Write beside the run's record where its points were computed, and until when."""
+        from chimera_hpc.store.runs import record_work
+
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        try:
+            record_work(orders.store, orders.run, {"machines": self._machines, "until": now})
+        except OSError:
+            # A disk that is full will be heard of from the blocks.
+            return
 
     def _note_trouble(self, block: int, trouble: Trouble) -> None:
         self.reporter.note(f"block {block}: {trouble.trace}")
@@ -302,16 +313,6 @@ def runs_of_results(store: Store) -> list[int]:
     """Return the numbers of the runs that left results in a store, rising."""
     ledger = store.ledger()
     return sorted({int(run) for run in set(ledger["run"][ledger["status"] != Status.NEVER])})
-
-
-def record_machines(orders: Orders, machines: list[str]) -> None:
-    """Write down on which machines a run's points were computed, beside its record."""
-    path = orders.stop_file.with_suffix(".machines.json")
-    try:
-        write_atomically(path, json.dumps(machines, indent=1).encode())
-    except OSError:
-        # A disk that is full will be heard of from the blocks.
-        return
 
 
 def _cannot_write(path: Path, error: OSError) -> BadInput:

@@ -17,11 +17,13 @@ from chimera_hpc.status import Status
 
 if TYPE_CHECKING:
     from chimera_hpc.commands.driving import Driver
-    from chimera_hpc.store import Store
+    from chimera_hpc.store import Damage, Store
 
 MOST_LINES = 20
 """Failed points that are listed one by one."""
 _REPAIRS = 3
+_PATIENCE = 10.0
+"""Seconds to wait for a file to show up."""
 
 
 def end(driver: Driver, folder: Path, args: Namespace) -> int:
@@ -95,6 +97,8 @@ def _reduce(driver: Driver, folder: Path, make_figures: bool) -> list[str]:
         try:
             reduce_sweep(folder, make_figures=make_figures, say=print)
         except DamagedChunk as error:
+            if _shows_up(driver.store, error.damage):
+                continue
             found = [str(error.damage)]
             print(f"damaged, to be computed anew: {error.damage}")
             driver.store.discard_block(error.damage.block)
@@ -104,6 +108,17 @@ def _reduce(driver: Driver, folder: Path, make_figures: bool) -> list[str]:
         else:
             return []
     return found
+
+
+def _shows_up(store: Store, damage: Damage) -> bool:
+    """Whether a chunk that is missing is there after a while.
+
+    Network file systems show late what other machines have written.
+    """
+    if damage.reason != "missing":
+        return False
+    left = store.find_damaged(patience=_PATIENCE)
+    return all((other.block, other.array) != (damage.block, damage.array) for other in left)
 
 
 _FAILURES = tuple(code for code in Status if code.is_failure)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -70,7 +69,7 @@ def _explain(store: Store, i: int) -> None:
 
 
 def _provenance(store: Store, run: int) -> list[str]:
-    from chimera_hpc.store.runs import read_run
+    from chimera_hpc.store.runs import read_run, read_work
 
     try:
         info = read_run(store.path, run)
@@ -82,11 +81,9 @@ def _provenance(store: Store, run: int) -> list[str]:
     if git:
         code += f", commit {git.get('commit')}" + (" with changes" if git.get("dirty") else "")
     lines = [f"run {run}, started {info.get('started')}, {code}"]
-    machines = store.path / "runs" / f"{run}.machines.json"
-    try:
-        names = json.loads(machines.read_bytes())
-    except (OSError, ValueError):
-        names = [f"{_table(info, 'machine').get('host')}: {_table(info, 'machine').get('cpu')}"]
+    machine = _table(info, "machine")
+    names = read_work(store.path, run).get("machines")
+    names = names if isinstance(names, list) else [f"{machine.get('host')}: {machine.get('cpu')}"]
     return [*lines, *(f"on {name}" for name in names)]
 
 

@@ -8,8 +8,9 @@ import json
 import os
 import zipfile
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from chimera_hpc.reduce.results import TRIPLET
 from chimera_hpc.status import Status
 from chimera_hpc.store import Store, open_sweep
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 _BUNDLED = ("results.json", "report.html", "run.log")
 
 
@@ -29,12 +33,10 @@ def to_csv(store: Store, target: Path, series: bool = False) -> None:
 
 
 def to_netcdf(store: Store, target: Path, series: bool = False) -> None:
-    """Write features, scalars and ledger as NetCDF 4; the series too if `series`.
+    """Write features, scalars and ledger as NetCDF; the series too if `series`.
 
-    Raises
-    ------
-    BadInput
-        When no library for NetCDF 4 is there.
+    NetCDF 4 where a library for it is there. NetCDF 3, which SciPy writes, has no 64-bit integers:
+    digests are texts of 16 hexadecimal digits there, and other large numbers are floats.
     """
     dataset = open_sweep(store.path)
     if not series:
@@ -47,9 +49,13 @@ def to_netcdf(store: Store, target: Path, series: bool = False) -> None:
         "spec": json.dumps(store.sweep.to_dict()),
         "digest": store.sweep.digest,
     }
+    engine: Any = next((name for name, module in _NETCDF_4 if find_spec(module)), "scipy")
+    if engine == "scipy":
+        _without_large_integers(dataset)
+    kind: Any = "NETCDF3_64BIT" if engine == "scipy" else "NETCDF4"
     temporary = temporary_name(target)
     try:
-        dataset.to_netcdf(temporary, format="NETCDF4", engine=_engine())
+        dataset.to_netcdf(temporary, format=kind, engine=engine)
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
@@ -111,14 +117,17 @@ def _files(store: Store, folder: Path) -> Iterator[Path]:
     yield from sorted((store.path / "runs").glob("*.json"))
 
 
-def _engine() -> Any:
-    for engine, module in (("netcdf4", "netCDF4"), ("h5netcdf", "h5netcdf")):
-        try:
-            __import__(module)
-        except ImportError:
+def _without_large_integers(dataset: xr.Dataset) -> None:
+    for name, variable in dataset.variables.items():
+        values = variable.values if variable.dtype == np.int64 else np.zeros(0, np.int64)
+        if not (np.abs(values.astype(np.float64)) >= 2**31).any():
             continue
-        return engine
-    raise BadInput("NetCDF needs the package netCDF4 or h5netcdf: pip install netCDF4")
+        if name == "digest":
+            texts = np.array([f"{value & (2**64 - 1):016x}" for value in values.tolist()])
+            dataset["digest"] = (variable.dims, texts, variable.attrs)
+        else:
+            dataset[name] = (variable.dims, values.astype(np.float64), variable.attrs)
 
 
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "dtype")
+_NETCDF_4: tuple[tuple[str, str], ...] = (("netcdf4", "netCDF4"), ("h5netcdf", "h5netcdf"))

@@ -93,6 +93,7 @@ def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: P
         file = path / name / METADATA
         own = node if node["node_type"] == "array" else None
         if own is not None and name.partition("/")[0] != REDUCTION and _json(file) != own:
+            file.parent.mkdir(exist_ok=True)
             write_atomically(file, json.dumps(own, indent=1).encode())
             done.append(f"{name}/{METADATA} written anew")
     known = set(root["consolidated_metadata"]["metadata"])

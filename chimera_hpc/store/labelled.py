@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from chimera_hpc.errors import BadInput
 from chimera_hpc.status import Status
 from chimera_hpc.store.store import Store
 
@@ -31,7 +32,11 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     import xarray as xr
 
     store = Store.open(_store_in(Path(path)))
-    stored = xr.open_zarr(store.path, chunks=None)
+    try:
+        stored = xr.open_zarr(store.path, chunks=None)
+    except (ValueError, KeyError, TypeError, OSError):
+        # We know better than what the file says: its copy is sound.
+        raise BadInput(f"{store.path}: its metadata are damaged; `run` writes them anew") from None
     ledger = store.ledger()
     dataset: xr.Dataset = stored.drop_vars(["features", "scalars", "ledger"])
     dataset = dataset.assign_coords(cell=("point", store.points.cells()[0], _attributes("cell")))

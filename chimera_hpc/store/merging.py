@@ -21,7 +21,7 @@ from chimera_hpc.status import Status
 from chimera_hpc.store.blocks import BlockFiles
 from chimera_hpc.store.extension import SAME_TABLES, point_keys, points_of
 from chimera_hpc.store.runs import FOLDER as RUNS
-from chimera_hpc.store.runs import read_run, run_numbers
+from chimera_hpc.store.runs import read_run, read_work, record_work, run_numbers
 from chimera_hpc.store.template import build, create_whole
 
 if TYPE_CHECKING:
@@ -111,6 +111,8 @@ class _Merge:
                     info["record"] = "unreadable"
                 data = json.dumps(info, indent=1).encode()
                 write_atomically(path / RUNS / f"{info['run']}.json", data)
+                if work := read_work(store.path, number):
+                    record_work(path, info["run"], work)
 
     def copy_blocks(self, path: Path, sweep: Sweep) -> None:
         size = self.stores[0].block_size

@@ -37,8 +37,8 @@ def read_series(files: BlockFiles, point: int) -> NDArray[np.float64]:
     damage = files.look("u", block)
     if damage:
         raise DamagedChunk(damage)
-    array = zarr.open_array(files.path / "u", mode="r")
     try:
+        array = zarr.open_array(files.path / "u", mode="r")
         return decode_series(np.asarray(array[point]))
     except Exception as error:
         # Each codec has its own way to say that bytes are not what it wrote.

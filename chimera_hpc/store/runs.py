@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc.errors import BadInput
-from chimera_hpc.files import create_exclusively
+from chimera_hpc.files import create_exclusively, write_atomically
 
 FOLDER = "runs"
 
@@ -42,6 +42,24 @@ def read_run(path: Path, number: int) -> dict[str, Any]:
     except (OSError, ValueError):
         raise BadInput(f"{path}: run {number} has left no readable record") from None
     return dict(info)
+
+
+def record_work(path: Path, number: int, info: Mapping[str, Any]) -> None:
+    """Write ``runs/<number>.work.json``: what is known of a run's work so far, or at its end."""
+    write_atomically(_work(path, number), json.dumps(dict(info), indent=1).encode())
+
+
+def read_work(path: Path, number: int) -> dict[str, Any]:
+    """Return what `record_work` wrote; nothing where that is not there or unreadable."""
+    try:
+        info = json.loads(_work(path, number).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return info if isinstance(info, dict) else {}
+
+
+def _work(path: Path, number: int) -> Path:
+    return path / FOLDER / f"{number}.work.json"
 
 
 def _file(path: Path, number: int) -> Path:

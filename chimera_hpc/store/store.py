@@ -101,8 +101,12 @@ class Store:
 
     @cached_property
     def points(self) -> Points:
-        """All points, in the order of the store."""
-        return points_of(self.sweeps)
+        """All points, in the order of the store; BadInput when they are not those of the arrays."""
+        points = points_of(self.sweeps)
+        if len(points) != self.n_points:
+            text = f"its specs have {len(points)} points, its arrays {self.n_points}"
+            raise BadInput(f"{self.path}: the attributes are damaged: {text}")
+        return points
 
     def check_spec(self, sweep: Sweep) -> None:
         """Raise BadInput, naming the keys that differ, unless the store was made for this sweep.
@@ -137,6 +141,7 @@ class Store:
         """
         with exclusive(self.path):
             present = self.open(self.path)
+            repair_metadata(self.path, present.metadata, present.sweep, present.points)
             extend(self.path, present.sweeps, sweep, self.block_size)
         return self.open(self.path)
 

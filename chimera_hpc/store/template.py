@@ -12,6 +12,7 @@ from typing import Any
 import zarr
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec, TransposeCodec, ZstdCodec
+from zarr.core.metadata.v3 import ArrayV3Metadata
 from zarr.storage import StoreLike
 
 from chimera_hpc.errors import BadInput
@@ -124,9 +125,13 @@ def check_root(path: Path, root: Mapping[str, Any]) -> Sweep:
         raise BadInput(f"{path}: the attributes spec, specs and digest do not belong together")
     for spec in specs:
         Sweep.from_dict(spec, where=str(path))
-    for plan in block_plans(sweep, attributes["n_points"], attributes["block_size"]):
+    n_points = attributes["n_points"]
+    damaged = [name for name, node in nodes.items() if not _is_sound(name, node, n_points)]
+    for plan in block_plans(sweep, n_points, attributes["block_size"]):
         if not _matches(nodes.get(plan.name), plan):
-            raise BadInput(f"{path}: the metadata of {plan.name} are damaged")
+            damaged.append(plan.name)
+    if damaged:
+        raise BadInput(f"{path}: the metadata of {damaged[0][:100]!r} are damaged")
     return sweep
 
 
@@ -175,6 +180,22 @@ def _digest(attributes: Mapping[str, Any]) -> str | None:
         return spec_digest(attributes["spec"])
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
+
+
+def _is_sound(name: str, node: Any, n_points: int) -> bool:
+    """Whether this is the metadata of a group, or of an array with as many points as there are.
+
+    A reduction may be older than the last extension.
+    """
+    try:
+        if node["node_type"] == "group":
+            return True
+        array = ArrayV3Metadata.from_dict(dict(node))
+        is_coordinate = array.dimension_names == ("point",) and "/" not in name
+        return array.shape == (n_points,) if is_coordinate else True
+    except Exception:
+        # Each part of the metadata has its own way to say that it is not one.
+        return False
 
 
 def _matches(node: Any, plan: ArrayPlan) -> bool:

@@ -199,7 +199,7 @@ def test_strict_refuses_other_code_and_leaves_everything(
     code, _, err = sweep(*run_words(job, finished, "--strict"))
     assert code == 2
     assert "--strict: run 1 had other python: 2.7.18 before" in err
-    assert sorted(os.listdir(finished / "store.zarr" / "runs")) == ["1.json", "1.machines.json"]
+    assert sorted(os.listdir(finished / "store.zarr" / "runs")) == ["1.json", "1.work.json"]
 
 
 def test_strict_has_nothing_against_the_same_code(job: Path, finished: Path, sweep: Run) -> None:

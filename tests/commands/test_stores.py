@@ -7,6 +7,7 @@ import json
 import os
 import zipfile
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 import xarray as xr
 
 from chimera_hpc.ledger import FIELDS, point_digest, read_ledger
+from chimera_hpc.status import Status
 from chimera_hpc.store import Store
 
 Run = Callable[..., tuple[int, str, str]]
@@ -257,6 +259,23 @@ def test_merge_takes_a_result_where_the_other_store_has_none(
     assert (ledger["status"] != 255).sum() == 9
 
 
+def test_merge_takes_a_result_where_the_other_store_has_a_failure(
+    parts: list[Path], tmp_path: Path, sweep: Run
+) -> None:
+    store = store_of(parts[0])
+    i = int(store.points.find(P=3, seed=2)[0])
+    block, row = divmod(i, store.block_size)
+    ledger = store.files.read("ledger", block).copy()
+    ledger[row, FIELDS.index("status")] = Status.TIME_OUT
+    store.files.write(block, {"ledger": ledger})
+    code, out, _ = sweep("merge", *parts, "--out", tmp_path / "all")
+    assert code == 0
+    assert f"8 points from {parts[0]}" in out
+    merged = store_of(tmp_path / "all")
+    assert merged.status()[Status.TIME_OUT] == 0
+    assert digests(tmp_path / "all")[3, 2] == digests(parts[1])[3, 2]
+
+
 def test_merge_refuses_sweeps_that_differ_in_more_than_axes(
     job: Path, finished: Path, tmp_path: Path, sweep: Run
 ) -> None:
@@ -301,14 +320,23 @@ def test_table_has_a_line_a_point_with_all_digits(
         assert row["V_theta"] == "" or float(row["V_theta"]) == value
 
 
-def test_netcdf_holds_what_the_store_does(finished: Path, tmp_path: Path, sweep: Run) -> None:
-    pytest.importorskip("netCDF4")
+@pytest.mark.parametrize("version", [3, 4])
+def test_netcdf_holds_what_the_store_does(
+    version: int, finished: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if version == 3:
+        monkeypatch.setattr("chimera_hpc.outputs.export._NETCDF_4", ())
+    elif not find_spec("netCDF4"):
+        pytest.skip("netCDF4 is not installed")
     target = tmp_path / "sweep.nc"
     assert sweep("export", finished, "--to", target, "--series")[0] == 0
     store = store_of(finished)
     with xr.open_dataset(target) as dataset:
         assert np.array_equal(dataset["amplitude"], store.features()[:, 0], equal_nan=True)
-        assert np.array_equal(dataset["digest"], store.ledger()["digest"])
+        digests = store.ledger()["digest"]
+        texts = [f"{digest & (2**64 - 1):016x}" for digest in digests.tolist()]
+        assert dataset["digest"].values.tolist() == (digests.tolist() if version == 4 else texts)
+        assert np.array_equal(dataset["seed"], store.points.columns["seed"])
         assert np.allclose(dataset["u"][3], store.series(3), rtol=0, atol=1e-12)
         assert dataset.attrs["digest"] == store.sweep.digest
     assert sweep("export", finished, "--to", target)[0] == 0

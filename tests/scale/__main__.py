@@ -128,7 +128,8 @@ def run(*arguments: object) -> Done:
         [sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
-    text = process.stdout.read()
+    with process.stdout as output:
+        text = output.read()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     seconds = time.perf_counter() - began

@@ -169,7 +169,7 @@ def test_array_metadata_that_contradict_the_spec_are_bad_input(store: Store) -> 
     root = store.path / "zarr.json"
     (store.path / "zarr.json.copy").unlink()
     root.write_bytes(root.read_bytes().replace(b'"data_type": "int16"', b'"data_type": "int64"'))
-    with pytest.raises(BadInput, match="the metadata of u are damaged"):
+    with pytest.raises(BadInput, match="the metadata of 'u' are damaged"):
         Store.open(store.path)
 
 

@@ -126,6 +126,8 @@ def test_killed_extension_has_not_happened(store: Store, monkeypatch: Any) -> No
         present = Store.open(store.path)
         assert present.n_points == 15
         assert present.status()[Status.DONE] == 15
+        count, stage = 0, 1000
+        present.repair()
     count, stage = 0, last
     assert store.extend(MORE).n_points == 32
 

@@ -1,0 +1,104 @@
+"""The bookkeeping of large sweeps; ``scripts/scale`` prints all of its measurements."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from chimera_hpc import work
+from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.ledger import FIELDS, chunk_name, seal
+from chimera_hpc.status import Status
+from chimera_hpc.store import Store
+from chimera_hpc.task import BlockResult, failed_block
+from chimera_hpc.work import Orders, do_block
+
+MILLION = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def scale() -> ModuleType:
+    """The program behind scripts/scale."""
+    path = Path(__file__).parent / "__main__.py"
+    spec = importlib.util.spec_from_file_location("scale_measurements", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def write_ledger(store: Store) -> None:
+    """Have every point look done."""
+    table = np.zeros((store.block_size, len(FIELDS)), dtype="<i8")
+    table[:, :2] = 1
+    data = seal(table.tobytes())
+    for block in range(store.n_blocks):
+        (store.path / "ledger" / chunk_name(block, 2)).write_bytes(data)
+
+
+@pytest.mark.slow
+def test_million_points_are_planned_in_seconds_and_looked_at_in_one(
+    scale: ModuleType, tmp_path: Path
+) -> None:
+    planned = scale.plan(tmp_path, "large", MILLION)
+    assert planned.seconds < 15
+    assert planned.memory < 1e9
+    store = Store.open(planned.path)
+    assert store.n_points == MILLION
+    write_ledger(store)
+    before = os.times()
+    looked = scale.run("-m", "chimera_hpc.sweep", "status", planned.path, "--json")
+    after = os.times()
+    assert f'"done": {MILLION}' in looked.text
+    # Time on the processor, so that a busy machine does not count.
+    spent = after.children_user + after.children_system
+    assert spent - before.children_user - before.children_system < 1.5
+
+
+def test_files_are_at_most_four_a_block_and_few_beside(
+    scale: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nothing(sweep: Sweep, points: Points, should_stop: object) -> BlockResult:
+        return failed_block(sweep, points, Status.DONE)
+
+    monkeypatch.setattr(work, "run_block", nothing)
+    job = tmp_path / "job.toml"
+    job.write_text(
+        scale.JOB.format(values=2)
+        .replace('series = "none"', 'series = "all"')
+        .replace("seeds = 1000", "seeds = 6\n[fixed]\nn_nodes = 25\n[features]\nstart = 990.0")
+        .replace("block = 300", "block = 4")
+    )
+    store = Store.plan(tmp_path / "store.zarr", Sweep.load(job))
+    empty = count_files(store.path)
+    for block in range(store.n_blocks):
+        do_block(Orders(store.path, 1), block)
+    assert store.n_blocks == 30
+    assert empty < 100
+    assert count_files(store.path) - empty == 4 * store.n_blocks
+
+
+def count_files(folder: Path) -> int:
+    return sum(len(files) for _, _, files in os.walk(folder))
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "at_least", "good"),
+    [(1.0, 2.0, False, True), (3.0, 2.0, False, False), (3.0, 2.0, True, True)],
+)
+def test_table_says_whether_a_limit_is_held(
+    value: float, limit: float, at_least: bool, good: bool, scale: ModuleType
+) -> None:
+    line = scale.Line("something", value, "s", limit, at_least)
+    assert line.good == good
+    table: Callable[..., str] = scale.table
+    assert f"{'>=' if at_least else '<='} {limit:g} s" in table([line])
