@@ -134,7 +134,6 @@ def simulate(
         lambda _, end: ends.append((end, end.samples)),
     )
     (end, rows), times = ends[0], control.times
-    rows = rows.copy()
     rows[:, end.n_sampled :] = np.nan
     u, w = model.node_pair(rows)
     return Trajectory(times, u.T, w.T, end.status, end.steps, rows, second, model)

@@ -33,6 +33,7 @@ from chimera_hpc.status import Status
 
 Array = NDArray[np.float64]
 
+OnSignals = Callable[[int, Array, Array], None]
 _RETRIED = (Status.NON_FINITE, Status.STEP_TOO_SMALL)
 
 
@@ -71,6 +72,7 @@ def run_block(
     *,
     should_stop: Callable[[], bool] | None = None,
     on_point: Callable[[int, Status], None] | None = None,
+    on_signals: OnSignals | None = None,
     lanes: int | None = None,
 ) -> BlockResult:
     """Integrate the points and measure their series.
@@ -87,10 +89,13 @@ def run_block(
         Asked about ten times a second; when true, the result is returned as far as it has come.
     on_point : callable, optional
         Called with (index, status) as each point ends.
+    on_signals : callable, optional
+        Called with (index, u, w) as each point ends; both signals are (N, T), NaN where the run did
+        not get to, as they were before u was rounded. They are buffers: copy what is to be kept.
     lanes : int, optional
         Lanes of the stepping loop; chosen from the work by default.
     """
-    block = _Block(sweep, points)
+    block = _Block(sweep, points, on_signals)
     with suppress(Stopped):
         for rows in _lane_groups(block.models):
             factor = 1.0
@@ -147,9 +152,9 @@ def rounded(u: Array, dtype: str) -> Array:
 class _Block:
     """Models, initial states and the result that the runs fill."""
 
-    def __init__(self, sweep: Sweep, points: Points) -> None:
+    def __init__(self, sweep: Sweep, points: Points, on_signals: OnSignals | None) -> None:
         n, times = len(points), sample_times(sweep)
-        self.sweep, self.times = sweep, times
+        self.sweep, self.times, self.on_signals = sweep, times, on_signals
         rows = [points.row(i) for i in range(n)]
         self.models = [build(sweep, row) for row in rows]
         self.initial = [
@@ -205,9 +210,13 @@ class _Block:
     def measure(self, row: int, outcome: Outcome) -> None:
         result, model = self.result, self.models[row]
         result.status[row] = outcome.status
+        if self.on_signals is not None:
+            outcome.samples[:, outcome.n_sampled :] = np.nan
+            self.on_signals(row, *model.node_pair(outcome.samples))
         if outcome.status is not Status.DONE:
             return
-        u, w = model.node_pair(outcome.samples)
+        # NumPy's sums depend on the layout, and a lone lane's samples lie across.
+        u, w = model.node_pair(np.ascontiguousarray(outcome.samples))
         u = rounded(u, self.sweep.keep.dtype)
         features = self.features(u)
         result.status[row] = features.status

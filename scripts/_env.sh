@@ -6,17 +6,20 @@
 # step, so the call after a killed one sees what happened and starts over. Another place starts over too, since
 # a virtual environment cannot be moved; other contents, or a .venv without a stamp, are upgraded in place.
 
+# A script that needs more sets `kind` first: kind=bench means .venv-bench and requirements-bench.lock.
+
 root=$(CDPATH='' cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
-venv=$root/.venv
+venv=$root/.venv${kind:+-$kind}
+lock=requirements${kind:+-$kind}.lock
 python=$venv/bin/python
 stamp=$venv/.chimera-stamp
 
 stamp_program='
 import hashlib, os, sys
 
-root = sys.argv[1]
+root, lock = sys.argv[1:]
 place = repr((root, sys.version_info[:2], sys.implementation.name, os.uname().machine)).encode()
-files = [os.path.join(root, name) for name in ("requirements.lock", "pyproject.toml")]
+files = [os.path.join(root, name) for name in (lock, "pyproject.toml")]
 contents = b"".join(hashlib.sha256(open(file, "rb").read()).digest() for file in files)
 print(hashlib.sha256(place).hexdigest(), hashlib.sha256(contents).hexdigest())
 '
@@ -30,7 +33,7 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 try:
     fcntl.flock(9, fcntl.LOCK_EX | fcntl.LOCK_NB)
 except BlockingIOError:
-    print("another call is setting up .venv; waiting for it", file=sys.stderr)
+    print("another call is setting up the environment; waiting for it", file=sys.stderr)
     fcntl.flock(9, fcntl.LOCK_EX)
 except OSError as error:
     print(f"warning: no lock on .venv ({error}); let one call at a time set it up", file=sys.stderr)
@@ -61,7 +64,7 @@ find_base_python() {
     die 2 "no Python 3.11, 3.12 or 3.13 with its venv module was found; install one or set PYTHON=/path/to/python"
 }
 
-current_stamp() { "$python" -IS -c "$stamp_program" "$root" 2>/dev/null; }
+current_stamp() { "$python" -IS -c "$stamp_program" "$root" "$lock" 2>/dev/null; }
 
 has_requested_version() { [[ -z ${PYTHON:-} || $(python_version "$PYTHON") == "$(python_version "$python")" ]]; }
 
@@ -86,7 +89,7 @@ install() (
     export PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1
     cd -- "$root"
     "$python" -m pip --version || "$python" -m ensurepip || exit
-    "$python" -m pip install --require-hashes -r requirements.lock || exit
+    "$python" -m pip install --require-hashes -r "$lock" || exit
     "$python" -m pip install --no-deps --no-build-isolation --editable .
 )
 
@@ -100,7 +103,7 @@ set_up() {
     find_base_python
     [[ -w $root ]] || die 2 "$root cannot be written to, and its .venv is missing or out of date"
     trap 'exit 130' INT
-    exec 9>>"$root/.venv.lock"
+    exec 9>>"$venv.lock"
     "$base" -I -c "$lock_program"
     if ! is_ready; then
         if is_upgradable; then

@@ -370,16 +370,13 @@ def runge_kutta(f, y, method, t_end, times, rtol, atol, max_steps=10**6):
 
 
 def log_norm(scaled):
-    """Logarithm of the root mean square, the squares added in four sums in turn."""
-    squares = scaled * scaled
-    whole = len(squares) // 4 * 4
-    sums = [0.0, 0.0, 0.0, 0.0]
-    for i in range(whole):
-        sums[i % 4] += squares[i]
-    for i in range(whole, len(squares)):
-        sums[0] += squares[i]
-    total = (sums[0] + sums[1]) + (sums[2] + sums[3])
-    return 0.5 * math.log(total / len(squares)) if total > 0.0 else math.log(1e-4)
+    """Logarithm of the root mean square, the squares added in eight sums in turn."""
+    sums = [0.0] * 8
+    for i, square in enumerate((scaled * scaled).tolist()):
+        sums[i % 8] += square
+    halves = [sums[i] + sums[i + 4] for i in range(4)]
+    total = (halves[0] + halves[2]) + (halves[1] + halves[3])
+    return 0.5 * math.log(total / len(scaled)) if total > 0.0 else math.log(1e-4)
 
 
 def first_step(f, y, slope, order, rtol, atol, t_end):

@@ -8,10 +8,15 @@ starts a fresh folder.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import platform
+import re
+import shutil
 import tempfile
+import time
+import uuid
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -24,6 +29,9 @@ _numba: Any = numba
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("integrate", "models", "features")
+_UNUSED_DAYS = 30
+_OLD = re.compile(r"[0-9a-f]{16}(\.[0-9a-f]{32}\.old)?")
+"""Name of a cache folder, or of one whose removal was broken off."""
 
 
 @cache
@@ -42,7 +50,8 @@ def cache_folder() -> str:
     """Folder of the compiled kernels.
 
     ``$NUMBA_CACHE_DIR`` where it is set (a cluster job sets it to a node-local folder), else
-    the user's cache folder, else, where that can't be written, a temporary folder.
+    the user's cache folder, else, where that can't be written, a temporary folder. Folders beside
+    it, of other sources, that no process has asked for in `_UNUSED_DAYS` days are removed.
     """
     base = os.environ.get("NUMBA_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -51,10 +60,28 @@ def cache_folder() -> str:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if os.access(folder, os.W_OK):
+            os.utime(folder)
+            _remove_unused(root)
             return str(folder)
     except OSError:
         pass
     return tempfile.mkdtemp(prefix="chimera_hpc-numba-")
+
+
+def _remove_unused(root: Path) -> None:
+    """Remove the folders of other digests whose last use is long ago.
+
+    Each is moved away first, so that of several processes one removes it, and nobody meets half of
+    it.
+    """
+    before = time.time() - _UNUSED_DAYS * 86400
+    for folder in root.iterdir():
+        ours = _OLD.fullmatch(folder.name) and folder.name != source_digest()
+        with contextlib.suppress(OSError):
+            if ours and folder.stat().st_mtime < before:
+                doomed = folder.with_name(f"{folder.name.partition('.')[0]}.{uuid.uuid4().hex}.old")
+                folder.rename(doomed)
+                shutil.rmtree(doomed)
 
 
 def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:

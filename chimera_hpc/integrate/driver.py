@@ -104,7 +104,10 @@ class Lanes:
 
     def __init__(self, lanes: int, system: System, control: Control, n_observed: int) -> None:
         method = METHODS[control.method]
-        rows = system.n_rows
+        # One lane has its rows in packs, up to the last one: rows of zeros fill that.
+        self.size = system.n_rows
+        rows, width = (_in_packs(n) if lanes == 1 else n for n in (self.size, n_observed))
+        self.n_observed = n_observed
         self.control, self.method = control, method
         self.rhs, self.ints = system.right_hand_side, system.int_params
         self.advance = K.advance(lanes)
@@ -116,20 +119,26 @@ class Lanes:
         self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
         self.count[K.STATE] = K.IDLE
         self.weights = aligned(method.stages, lanes)
-        self.samples = np.zeros((lanes, n_observed, control.n_samples))
+        shape = (control.n_samples, width) if lanes == 1 else (width, control.n_samples)
+        self.samples = np.zeros((lanes, *shape))
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:
         """Begin a trajectory in lane ``m``."""
-        self.y[:, m] = y0
+        self.y[: self.size, m] = y0
         self.params[:, m] = params
         self.lane[:, m] = 0.0
         self.lane[K.LOG_ERROR, m] = K.LOG_ERROR_FLOOR
         self.count[:, m] = 0
         self.count[K.STATE, m] = K.FRESH
         if self.control.start <= 0.0:
-            self.samples[m, :, 0] = y0[: self.samples.shape[1]]
+            self.sampled(m)[:, 0] = y0[: self.n_observed]
             self.count[K.NEXT_SAMPLE, m] = 1
+
+    def sampled(self, m: int) -> Array:
+        """Samples of lane ``m``, shape (n_observed, n_samples)."""
+        samples: Array = self.samples[m]
+        return samples.T[: self.n_observed] if len(self.samples) == 1 else samples
 
     def clear(self, m: int) -> None:
         """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""
@@ -143,7 +152,18 @@ class Lanes:
         began = time.perf_counter()
         done = self.advance(
             *(self.rhs, self.params, self.ints, self.y, self.y1, self.k, self.work),
-            *(self.lane, self.count, m.a, m.e, m.p, float(m.order), c.rtol, c.atol, c.t_end),
+            *(
+                self.lane,
+                self.count,
+                self.size,
+                m.a,
+                m.e,
+                m.p,
+                float(m.order),
+                c.rtol,
+                c.atol,
+                c.t_end,
+            ),
             *(c.max_steps, c.start, c.step, self.weights, self.samples, self.iterations),
         )
         elapsed = time.perf_counter() - began
@@ -151,6 +171,10 @@ class Lanes:
             scale = SLICE / max(elapsed, 1e-6)
             self.iterations = int(self.iterations * min(max(scale, 0.25), 8.0)) + 1
         return elapsed
+
+
+def _in_packs(n: int) -> int:
+    return -(-n // LANES) * LANES
 
 
 def choose_lanes(n_trajectories: int, n_observed: int, n_samples: int) -> int:
@@ -232,9 +256,9 @@ def integrate(
                     Status(state),
                     int(pool.count[K.ACCEPTED, m]),
                     float(spent[m]),
-                    pool.samples[m],
+                    pool.sampled(m),
                     int(pool.count[K.NEXT_SAMPLE, m]),
-                    pool.y[:, m].copy(),
+                    pool.y[: pool.size, m].copy(),
                 ),
             )
             fill(m)

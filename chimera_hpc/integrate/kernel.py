@@ -18,7 +18,17 @@ from typing import Any
 from numba.core import types
 
 from chimera_hpc.integrate._jit import jit
-from chimera_hpc.integrate.simd import LANES, larger, load, magnitude, splat, store
+from chimera_hpc.integrate.simd import (
+    LANES,
+    across,
+    fold,
+    larger,
+    load,
+    magnitude,
+    splat,
+    store,
+    store_at,
+)
 from chimera_hpc.status import Status
 
 # Rows of the lanes' numbers, ``lane`` (LANE_ROWS, lanes).
@@ -47,152 +57,168 @@ RIGHT_HAND_SIDE = types.void(_MATRIX, _MATRIX, _MATRIX, types.Array(types.int64,
 
 
 @jit()
-def _stage_sum(like: Any, y: Any, lane: Any, k: Any, first: Any, a: Any, s: Any, out: Any) -> None:
+def _stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, out: Any) -> None:
     # out = y + h * sum_{j < s} a[s, j] k_j; spelled out up to six terms so that the compiler
-    # keeps the weights in registers, and works on neighbouring rows when there is one lane.
-    rows = y.shape[0]
-    h = load(like, lane, STEP)
+    # keeps the weights in registers.
     o0 = first
     if s == 1:
         a0 = a[s, 0]
-        for i in range(rows):
-            store(out, i, load(like, y, i) + h * (a0 * load(like, k, o0 + i)))
+        for i in range(units):
+            store(out, i, load(h, y, i) + h * (a0 * load(h, k, o0 + i)))
         return
-    o1 = rows
+    o1 = units
     if s == 2:
         a0, a1 = a[s, 0], a[s, 1]
-        for i in range(rows):
-            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
-            store(out, i, load(like, y, i) + h * total)
+        for i in range(units):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            store(out, i, load(h, y, i) + h * total)
         return
-    o2 = 2 * rows
+    o2 = 2 * units
     if s == 3:
         a0, a1, a2 = a[s, 0], a[s, 1], a[s, 2]
-        for i in range(rows):
-            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
-            total = total + a2 * load(like, k, o2 + i)
-            store(out, i, load(like, y, i) + h * total)
+        for i in range(units):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i)
+            store(out, i, load(h, y, i) + h * total)
         return
-    o3 = 3 * rows
+    o3 = 3 * units
     if s == 4:
         a0, a1, a2, a3 = a[s, 0], a[s, 1], a[s, 2], a[s, 3]
-        for i in range(rows):
-            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
-            total = total + a2 * load(like, k, o2 + i) + a3 * load(like, k, o3 + i)
-            store(out, i, load(like, y, i) + h * total)
+        for i in range(units):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
+            store(out, i, load(h, y, i) + h * total)
         return
-    o4 = 4 * rows
+    o4 = 4 * units
     if s == 5:
         a0, a1, a2, a3, a4 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4]
-        for i in range(rows):
-            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
-            total = total + a2 * load(like, k, o2 + i) + a3 * load(like, k, o3 + i)
-            total = total + a4 * load(like, k, o4 + i)
-            store(out, i, load(like, y, i) + h * total)
+        for i in range(units):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
+            total = total + a4 * load(h, k, o4 + i)
+            store(out, i, load(h, y, i) + h * total)
         return
-    o5 = 5 * rows
+    o5 = 5 * units
     if s == 6:
         a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
-        for i in range(rows):
-            total = a0 * load(like, k, o0 + i) + a1 * load(like, k, o1 + i)
-            total = total + a2 * load(like, k, o2 + i) + a3 * load(like, k, o3 + i)
-            total = total + a4 * load(like, k, o4 + i) + a5 * load(like, k, o5 + i)
-            store(out, i, load(like, y, i) + h * total)
+        for i in range(units):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
+            total = total + a4 * load(h, k, o4 + i) + a5 * load(h, k, o5 + i)
+            store(out, i, load(h, y, i) + h * total)
         return
-    for i in range(rows):
-        total = a[s, 0] * load(like, k, o0 + i)
+    for i in range(units):
+        total = a[s, 0] * load(h, k, o0 + i)
         for j in range(1, s):
-            total = total + a[s, j] * load(like, k, j * rows + i)
-        store(out, i, load(like, y, i) + h * total)
+            total = total + a[s, j] * load(h, k, j * units + i)
+        store(out, i, load(h, y, i) + h * total)
 
 
 @jit()
-def _error_sum(
-    like: Any, y: Any, y1: Any, lane: Any, k: Any, first: Any, e: Any, rtol: Any, atol: Any,
+def _squared_errors(
+    h: Any, y: Any, y1: Any, k: Any, first: Any, units: Any, e: Any, rtol: Any, atol: Any,
     work: Any,
 ) -> None:  # fmt: skip
-    # sum_i (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2, HNW eq. II.4.11 without the root; the
-    # rows go to four sums in turn, which are then added in a fixed order.
-    rows = y.shape[0]
+    # (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2, the terms of HNW eq. II.4.11.
     stages = e.size
-    last = rows * (stages - 1) - first
-    h = load(like, lane, STEP)
+    last = units * (stages - 1) - first
     if stages == 7:
         e0, e1, e2, e3, e4, e5, e6 = e[0], e[1], e[2], e[3], e[4], e[5], e[6]
-        o1, o2, o3, o4, o5 = rows, 2 * rows, 3 * rows, 4 * rows, 5 * rows
-        for i in range(rows):
-            total = e0 * load(like, k, first + i) + e1 * load(like, k, o1 + i)
-            total = total + e2 * load(like, k, o2 + i) + e3 * load(like, k, o3 + i)
-            total = total + e4 * load(like, k, o4 + i) + e5 * load(like, k, o5 + i)
-            total = h * (total + e6 * load(like, k, last + i))
-            size = larger(magnitude(load(like, y, i)), magnitude(load(like, y1, i)))
+        o1, o2, o3, o4, o5 = units, 2 * units, 3 * units, 4 * units, 5 * units
+        for i in range(units):
+            total = e0 * load(h, k, first + i) + e1 * load(h, k, o1 + i)
+            total = total + e2 * load(h, k, o2 + i) + e3 * load(h, k, o3 + i)
+            total = total + e4 * load(h, k, o4 + i) + e5 * load(h, k, o5 + i)
+            total = h * (total + e6 * load(h, k, last + i))
+            size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
             ratio = total / (atol + rtol * size)
             store(work, i, ratio * ratio)
     else:
-        for i in range(rows):
-            total = e[0] * load(like, k, first + i)
+        for i in range(units):
+            total = e[0] * load(h, k, first + i)
             for j in range(1, stages - 1):
-                total = total + e[j] * load(like, k, j * rows + i)
-            total = h * (total + e[stages - 1] * load(like, k, last + i))
-            size = larger(magnitude(load(like, y, i)), magnitude(load(like, y1, i)))
+                total = total + e[j] * load(h, k, j * units + i)
+            total = h * (total + e[stages - 1] * load(h, k, last + i))
+            size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
             ratio = total / (atol + rtol * size)
             store(work, i, ratio * ratio)
-    zero = like
-    s0, s1, s2, s3 = zero, zero, zero, zero
-    quads = rows // 4
-    for q in range(quads):
-        s0 = s0 + load(like, work, 4 * q)
-        s1 = s1 + load(like, work, 4 * q + 1)
-        s2 = s2 + load(like, work, 4 * q + 2)
-        s3 = s3 + load(like, work, 4 * q + 3)
-    for i in range(4 * quads, rows):
-        s0 = s0 + load(like, work, i)
-    store(lane, ERROR_SUM, (s0 + s1) + (s2 + s3))
+
+
+@jit()
+def _add_up(zero: Any, work: Any, units: Any, lane: Any) -> None:
+    # Sum over the rows, HNW eq. II.4.11 without the root: rows go to eight sums in turn, which
+    # are then folded in halves. One lane has its eight sums side by side in a pack.
+    if lane.shape[1] == 1:
+        total = load(zero, work, 0)
+        for i in range(1, units):
+            total = total + load(zero, work, i)
+        lane[ERROR_SUM, 0] = fold(total)
+        return
+    s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
+    whole = units - units % 8
+    for i in range(0, whole, 8):
+        s0 = s0 + load(zero, work, i)
+        s1 = s1 + load(zero, work, i + 1)
+        s2 = s2 + load(zero, work, i + 2)
+        s3 = s3 + load(zero, work, i + 3)
+        s4 = s4 + load(zero, work, i + 4)
+        s5 = s5 + load(zero, work, i + 5)
+        s6 = s6 + load(zero, work, i + 6)
+        s7 = s7 + load(zero, work, i + 7)
+    left = units - whole
+    s0 = s0 + load(zero, work, whole) if left > 0 else s0
+    s1 = s1 + load(zero, work, whole + 1) if left > 1 else s1
+    s2 = s2 + load(zero, work, whole + 2) if left > 2 else s2
+    s3 = s3 + load(zero, work, whole + 3) if left > 3 else s3
+    s4 = s4 + load(zero, work, whole + 4) if left > 4 else s4
+    s5 = s5 + load(zero, work, whole + 5) if left > 5 else s5
+    s6 = s6 + load(zero, work, whole + 6) if left > 6 else s6
+    store(lane, ERROR_SUM, ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))
 
 
 @jit()
 def _scaled_norm(
-    a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, m: Any, rtol: Any, atol: Any
-) -> Any:
+    a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, m: Any, size: Any, rtol: Any,
+    atol: Any,
+) -> Any:  # fmt: skip
     # Norm of a - weight * b in the error scale of y, in lane m; a, b start at rows a0, b0.
-    rows = y.shape[0]
     total = 0.0
-    for i in range(rows):
+    for i in range(size):
         ratio = (a[a0 + i, m] - weight * b[b0 + i, m]) / (atol + rtol * abs(y[i, m]))
         total += ratio * ratio
-    return math.sqrt(total / rows)
+    return math.sqrt(total / size)
 
 
 @jit()
 def _start(
     rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, first: Any, lane: Any, count: Any,
-    order: Any, rtol: Any, atol: Any, t_end: Any,
+    size: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
 ) -> None:  # fmt: skip
     # First derivative and first step size of the lanes just put in, HNW sec. II.4 ("Starting
     # step size"); the rows of the other lanes are not touched.
     rows, lanes = y.shape
     s1, s2 = rows, 2 * rows
-    rhs(y, k[s1 : s1 + rows], params, ints)
+    rhs(y[:size], k[s1 : s1 + size], params, ints)
     for m in range(lanes):
         if count[STATE, m] == FRESH:
-            for i in range(rows):
+            for i in range(size):
                 k[first + i, m] = k[s1 + i, m]
-            d0 = _scaled_norm(y, y, 0.0, y, 0, 0, m, rtol, atol)
-            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, rtol, atol)
+            d0 = _scaled_norm(y, y, 0.0, y, 0, 0, m, size, rtol, atol)
+            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, size, rtol, atol)
             h = 1e-6
             if d0 >= 1e-5 and d1 >= 1e-5:
                 h = 0.01 * d0 / d1
             lane[STEP, m] = min(h, t_end)
     for m in range(lanes):
         h = lane[STEP, m] if count[STATE, m] == FRESH else 0.0
-        for i in range(rows):
+        for i in range(size):
             y1[i, m] = y[i, m] + h * k[s1 + i, m]
-    rhs(y1, k[s2 : s2 + rows], params, ints)
+    rhs(y1[:size], k[s2 : s2 + size], params, ints)
     for m in range(lanes):
         if count[STATE, m] == FRESH:
             h = lane[STEP, m]
-            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, rtol, atol)
-            d2 = _scaled_norm(k, k, 1.0, y, s2, s1, m, rtol, atol) / h
+            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, size, rtol, atol)
+            d2 = _scaled_norm(k, k, 1.0, y, s2, s1, m, size, rtol, atol) / h
             d = max(d1, d2)
             h1 = max(1e-6, h * 1e-3)
             if d > 1e-15:
@@ -205,7 +231,7 @@ def _start(
 
 
 @jit()
-def _judge(lane: Any, count: Any, rows: Any, t_end: Any) -> Any:
+def _judge(lane: Any, count: Any, size: Any, t_end: Any) -> Any:
     # Accept or reject the step of each running lane; returns the number of lanes rejected.
     rejected = 0
     for m in range(lane.shape[1]):
@@ -217,7 +243,7 @@ def _judge(lane: Any, count: Any, rows: Any, t_end: Any) -> Any:
         if not math.isfinite(error_sum):
             log_error = math.inf
         elif error_sum > 0.0:
-            log_error = 0.5 * math.log(error_sum / rows)
+            log_error = 0.5 * math.log(error_sum / size)
         lane[LOG_ERROR_NEW, m] = log_error
         lane[TIME_NEW, m] = lane[TIME, m]
         if log_error <= 0.0:
@@ -230,16 +256,19 @@ def _judge(lane: Any, count: Any, rows: Any, t_end: Any) -> Any:
 
 @jit()
 def _sample(
-    like: Any, y: Any, k: Any, first: Any, work: Any, lane: Any, count: Any, p: Any, start: Any,
-    step: Any, t_end: Any, weights: Any, samples: Any,
+    like: Any, h: Any, y: Any, k: Any, first: Any, units: Any, work: Any, lane: Any, count: Any,
+    p: Any, start: Any, step: Any, t_end: Any, weights: Any, samples: Any,
 ) -> None:  # fmt: skip
     # Values of the observed rows at the sampling times that the accepted steps cover, by the
     # continuous extension; the lanes take their first, second, ... sample of the step together.
-    rows, lanes = y.shape
+    lanes = y.shape[1]
     stages, degree = p.shape
-    total = samples.shape[2]
-    last = rows * (stages - 1) - first
-    h = load(like, lane, STEP)
+    # One lane's samples are (times, rows), so that packs are written; others' (rows, times).
+    width, total = samples.shape[1:]
+    if lanes == 1:
+        total, width = width, total
+    observed = width // LANES if lanes == 1 else width
+    last = units * (stages - 1) - first
     while True:
         due = 0
         for m in range(lanes):
@@ -261,17 +290,22 @@ def _sample(
                 weights[j, m] = weight
         if due == 0:
             return
-        for i in range(samples.shape[1]):
-            value = load(like, weights, 0) * load(like, k, first + i)
+        for i in range(observed):
+            value = across(like, weights, 0) * load(h, k, first + i)
             for j in range(1, stages - 1):
-                value = value + load(like, weights, j) * load(like, k, j * rows + i)
-            value = value + load(like, weights, stages - 1) * load(like, k, last + i)
-            store(work, i, load(like, y, i) + h * value)
+                value = value + across(like, weights, j) * load(h, k, j * units + i)
+            value = value + across(like, weights, stages - 1) * load(h, k, last + i)
+            value = load(h, y, i) + h * value
+            if lanes == 1:
+                store_at(samples, count[NEXT_SAMPLE, 0] * width + i * LANES, value)
+            else:
+                store(work, i, value)
         for m in range(lanes):
             if count[IS_DUE, m] == 1:
                 at = count[NEXT_SAMPLE, m]
-                for i in range(samples.shape[1]):
-                    samples[m, i, at] = work[i, m]
+                if lanes > 1:
+                    for i in range(width):
+                        samples[m, i, at] = work[i, m]
                 count[NEXT_SAMPLE, m] = at + 1
 
 
@@ -310,10 +344,12 @@ def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps:
 @jit()
 def _advance(
     like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, work: Any, lane: Any,
-    count: Any, a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
+    count: Any, size: Any, a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
     max_steps: Any, start: Any, step: Any, weights: Any, samples: Any, iterations: Any,
 ) -> Any:  # fmt: skip
     rows, lanes = y.shape
+    units = rows // LANES if lanes == 1 else rows
+    zero = splat(0.0)
     stages = e.size
     first = 0
     n_fresh = 0
@@ -322,24 +358,30 @@ def _advance(
         n_fresh += count[STATE, m] == FRESH
         n_running += count[STATE, m] == RUNNING
     if n_fresh > 0:
-        _start(rhs, params, ints, y, y1, k, first, lane, count, order, rtol, atol, t_end)
+        _start(rhs, params, ints, y, y1, k, first, lane, count, size, order, rtol, atol, t_end)
         n_running += n_fresh
     done = 0
     swapped = False
     still = n_running
     while done < iterations and still == n_running:
+        h = across(like, lane, STEP)
         last = rows * (stages - 1) - first
+        first_unit = first * units // rows
         for s in range(1, stages):
-            _stage_sum(like, y, lane, k, first, a, s, y1)
+            _stage_sum(h, y, k, first_unit, units, a, s, y1)
             o = last if s == stages - 1 else s * rows
-            rhs(y1, k[o : o + rows], params, ints)
-        _error_sum(like, y, y1, lane, k, first, e, rtol, atol, work)
-        rejected = _judge(lane, count, rows, t_end)
-        _sample(like, y, k, first, work, lane, count, p, start, step, t_end, weights, samples)
+            rhs(y1[:size], k[o : o + size], params, ints)
+        _squared_errors(h, y, y1, k, first_unit, units, e, rtol, atol, work)
+        _add_up(zero, work, units, lane)
+        rejected = _judge(lane, count, size, t_end)
+        _sample(
+            like, h, y, k, first_unit, units, work, lane, count, p, start, step, t_end, weights,
+            samples,
+        )  # fmt: skip
         if rejected > 0:
             for m in range(lanes):
                 if count[STATE, m] == RUNNING and lane[LOG_ERROR_NEW, m] > 0.0:
-                    for i in range(rows):
+                    for i in range(size):
                         y1[i, m] = y[i, m]
                         k[last + i, m] = k[first + i, m]
         still = 0
@@ -367,7 +409,7 @@ _SIGNATURE = types.int64(
     types.FunctionType(RIGHT_HAND_SIDE),
     *(_MATRIX, types.Array(types.int64, 1, "C")),
     *(_MATRIX, _MATRIX, _MATRIX, _MATRIX),
-    *(_MATRIX, types.Array(types.int64, 2, "C")),
+    *(_MATRIX, types.Array(types.int64, 2, "C"), types.int64),
     *(_MATRIX, _VECTOR, _MATRIX),
     *(types.float64, types.float64, types.float64, types.float64, types.int64),
     *(types.float64, types.float64, _MATRIX, types.Array(types.float64, 3, "C"), types.int64),
@@ -375,22 +417,22 @@ _SIGNATURE = types.int64(
 
 
 def _advance_one(  # type: ignore[no-untyped-def]
-    rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end, max_steps,
-    start, step, weights, samples, iterations,
+    rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol, t_end,
+    max_steps, start, step, weights, samples, iterations,
 ):  # fmt: skip
     return _advance(
-        0.0, rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end,
-        max_steps, start, step, weights, samples, iterations,
+        0.0, rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol,
+        t_end, max_steps, start, step, weights, samples, iterations,
     )  # fmt: skip
 
 
 def _advance_pack(  # type: ignore[no-untyped-def]
-    rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol, t_end, max_steps,
-    start, step, weights, samples, iterations,
+    rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol, t_end,
+    max_steps, start, step, weights, samples, iterations,
 ):  # fmt: skip
     return _advance(
-        splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, a, e, p, order, rtol, atol,
-        t_end, max_steps, start, step, weights, samples, iterations,
+        splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol,
+        atol, t_end, max_steps, start, step, weights, samples, iterations,
     )  # fmt: skip
 
 
@@ -398,9 +440,9 @@ def _advance_pack(  # type: ignore[no-untyped-def]
 def advance(lanes: int) -> Any:
     """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
 
-    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, a, e, p, order,
-    rtol, atol, t_end, max_steps, start, step, weights, samples, iterations)`` tries at most
-    ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
+    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, size, a, e, p,
+    order, rtol, atol, t_end, max_steps, start, step, weights, samples, iterations)`` tries at
+    most ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
     returns how many it tried. Lanes marked `FRESH` are started first: first derivative, first step
     size.
     """

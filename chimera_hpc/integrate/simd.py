@@ -5,7 +5,10 @@ with a `pack` it works on `LANES` of them, lane by lane with the very same IEEE 
 the same order. That is why a trajectory has the same bits whatever its lane and its neighbours.
 
 Arrays are (rows, lanes), C-contiguous. ``load(like, array, row)`` reads row ``row`` as the
-kind of number that ``like`` is, ``store(array, row, value)`` writes it.
+kind of number that ``like`` is, ``store(array, row, value)`` writes it. A trajectory alone has its
+rows one after the other in memory: there a pack is eight neighbouring rows, which `load_at`,
+`load_some` and their partners reach by their offset, and sums over rows are added in eight turns
+(`fold`) or in three levels (`SCAN`), an order that lanes side by side can keep too.
 
 With ``NUMBA_DISABLE_JIT=1`` a pack is a NumPy array of `LANES` numbers.
 """
@@ -47,9 +50,32 @@ class _PackModel(models.PrimitiveModel):
         super().__init__(manager, pack, _VECTOR)  # type: ignore[no-untyped-call]
 
 
-def _row_pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, offset: Any) -> Any:
     struct = context.make_array(array_type)(context, builder, array)
-    return builder.gep(struct.data, [row])
+    return builder.gep(struct.data, [offset])
+
+
+def _spread(builder: Any, number: Any) -> Any:
+    undefined = ir.Constant(_VECTOR, ir.Undefined)
+    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(first, undefined, mask)
+
+
+_NOTHING = ir.Constant(_VECTOR, [-0.0] * LANES)
+SCAN = ((8, 0, 8, 2, 8, 4, 8, 6), (8, 8, 1, 1, 8, 8, 5, 5), (8, 8, 8, 8, 3, 3, 3, 3))
+"""Running sums of eight in three levels: the place that is added to each place, 8 for none."""
+
+
+def _places() -> Any:
+    return ir.Constant(ir.VectorType(ir.IntType(64), LANES), list(range(LANES)))
+
+
+def _spread_integer(builder: Any, number: Any) -> Any:
+    kind = ir.VectorType(ir.IntType(64), LANES)
+    first = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.IntType(32)(0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), mask)
 
 
 _config: Any = numba.config  # its attributes are made at run time
@@ -61,11 +87,51 @@ if _config.DISABLE_JIT:
 
     def load(like: Any, array: Any, row: int) -> Any:
         """Read row ``row`` of ``array`` (rows, lanes) as the kind of number ``like`` is."""
-        return array[row, 0] if np.ndim(like) == 0 else array[row].copy()
+        return array[row, 0] if np.ndim(like) == 0 else load_at(array, row * LANES)
 
     def store(array: Any, row: int, value: Any) -> None:
         """Write a number or a pack into row ``row`` of ``array`` (rows, lanes)."""
-        array[row] = value
+        if np.ndim(value):
+            store_at(array, row * LANES, value)
+        else:
+            array[row, 0] = value
+
+    def across(like: Any, array: Any, row: int) -> Any:
+        """Read the lanes' numbers as a pack; one lane's number stands in all places."""
+        return np.full(LANES, array[row, 0]) if np.ndim(like) == 0 else array[row].copy()
+
+    def load_at(array: Any, offset: int) -> Any:
+        """Read a pack of neighbours from the numbers of ``array`` in the order of memory."""
+        return array.reshape(-1)[offset : offset + LANES].copy()
+
+    def store_at(array: Any, offset: int, pack: Any) -> None:
+        """Write a pack over neighbours among the numbers of ``array`` in the order of memory."""
+        array.reshape(-1)[offset : offset + LANES] = pack
+
+    def load_some(array: Any, offset: int, low: int, high: int) -> Any:
+        """Read places ``low <= j < high`` of a pack as `load_at` does; -0.0 elsewhere."""
+        pack = np.full(LANES, -0.0)
+        pack[low:high] = array.reshape(-1)[offset + low : offset + high]
+        return pack
+
+    def store_some(array: Any, offset: int, pack: Any, count: int) -> None:
+        """Write the first ``count`` places of a pack as `store_at` does."""
+        array.reshape(-1)[offset : offset + count] = pack[:count]
+
+    def add_shifted(pack: Any, level: int) -> Any:
+        """Do one level of `scan` within a pack."""
+        source = np.array(SCAN[level])
+        return pack + np.where(source < LANES, pack[source % LANES], -0.0)
+
+    def last_of(pack: Any) -> Any:
+        """Take the number in the last place of a pack."""
+        return pack[LANES - 1]
+
+    def fold(pack: Any) -> Any:
+        """Add up a pack: halves onto each other until one number is left."""
+        half = pack[:4] + pack[4:]
+        quarter = half[:2] + half[2:]
+        return quarter[0] + quarter[1]
 
     def larger(a: Any, b: Any) -> Any:
         """Larger of two numbers, lane by lane; ``b`` where either is NaN."""
@@ -82,10 +148,7 @@ else:
         """Give a pack with ``value`` in every lane."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            zero = ir.Constant(_VECTOR, ir.Undefined)
-            first = builder.insert_element(zero, args[0], ir.Constant(ir.IntType(32), 0))
-            mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-            return builder.shuffle_vector(first, zero, mask)
+            return _spread(builder, args[0])
 
         return pack_type(types.float64), generate
 
@@ -98,13 +161,136 @@ else:
             row = context.cast(builder, args[2], row_type, types.intp)
             if isinstance(like, PackType):
                 row = builder.mul(row, ir.Constant(row.type, LANES))
-            pointer = _row_pointer(context, builder, array_type, args[1], row)
+            pointer = _pointer(context, builder, array_type, args[1], row)
             if isinstance(like, PackType):
                 pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
             return builder.load(pointer, align=8)
 
         result = pack_type if isinstance(like, PackType) else types.float64
         return result(like, array, row), generate
+
+    @intrinsic
+    def across(typing_context: Any, like: Any, array: Any, row: Any) -> Any:
+        """Read the lanes' numbers as a pack; one lane's number stands in all places."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            _, array_type, row_type = signature.args
+            row = context.cast(builder, args[2], row_type, types.intp)
+            if isinstance(like, PackType):
+                row = builder.mul(row, ir.Constant(row.type, LANES))
+            pointer = _pointer(context, builder, array_type, args[1], row)
+            if isinstance(like, PackType):
+                return builder.load(builder.bitcast(pointer, _VECTOR.as_pointer()), align=8)
+            return _spread(builder, builder.load(pointer, align=8))
+
+        return pack_type(like, array, row), generate
+
+    @intrinsic
+    def load_at(typing_context: Any, array: Any, offset: Any) -> Any:
+        """Read a pack of neighbours from the numbers of ``array`` in the order of memory."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            array_type, offset_type = signature.args
+            offset = context.cast(builder, args[1], offset_type, types.intp)
+            pointer = _pointer(context, builder, array_type, args[0], offset)
+            return builder.load(builder.bitcast(pointer, _VECTOR.as_pointer()), align=8)
+
+        return pack_type(array, offset), generate
+
+    @intrinsic
+    def store_at(typing_context: Any, array: Any, offset: Any, pack: Any) -> Any:
+        """Write a pack over neighbours among the numbers of ``array`` in the order of memory."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            array_type, offset_type, _ = signature.args
+            offset = context.cast(builder, args[1], offset_type, types.intp)
+            pointer = _pointer(context, builder, array_type, args[0], offset)
+            builder.store(args[2], builder.bitcast(pointer, _VECTOR.as_pointer()), align=8)
+            return context.get_dummy_value()
+
+        return types.void(array, offset, pack), generate
+
+    @intrinsic
+    def load_some(typing_context: Any, array: Any, offset: Any, low: Any, high: Any) -> Any:
+        """Read places ``low <= j < high`` of a pack as `load_at` does; -0.0 elsewhere."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            array_type, *kinds = signature.args
+            numbers = zip(args[1:], kinds, strict=True)
+            offset, low, high = (context.cast(builder, n, kind, types.intp) for n, kind in numbers)
+            pointer = _pointer(context, builder, array_type, args[0], offset)
+            pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
+            mask = builder.and_(
+                builder.icmp_signed(">=", _places(), _spread_integer(builder, low)),
+                builder.icmp_signed("<", _places(), _spread_integer(builder, high)),
+            )
+            kind = ir.FunctionType(_VECTOR, [pointer.type, ir.IntType(32), mask.type, _VECTOR])
+            insert: Any = cgutils.get_or_insert_function
+            function = insert(builder.module, kind, f"llvm.masked.load.v{LANES}f64.p0")
+            return builder.call(function, [pointer, ir.IntType(32)(8), mask, _NOTHING])
+
+        return pack_type(array, offset, low, high), generate
+
+    @intrinsic
+    def store_some(typing_context: Any, array: Any, offset: Any, pack: Any, count: Any) -> Any:
+        """Write the first ``count`` places of a pack as `store_at` does."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            array_type, offset_type, _, count_type = signature.args
+            offset = context.cast(builder, args[1], offset_type, types.intp)
+            count = context.cast(builder, args[3], count_type, types.intp)
+            pointer = _pointer(context, builder, array_type, args[0], offset)
+            pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
+            mask = builder.icmp_signed("<", _places(), _spread_integer(builder, count))
+            kind = ir.FunctionType(
+                ir.VoidType(), [_VECTOR, pointer.type, ir.IntType(32), mask.type]
+            )
+            insert: Any = cgutils.get_or_insert_function
+            function = insert(builder.module, kind, f"llvm.masked.store.v{LANES}f64.p0")
+            builder.call(function, [args[2], pointer, ir.IntType(32)(8), mask])
+            return context.get_dummy_value()
+
+        return types.void(array, offset, pack, count), generate
+
+    @intrinsic(prefer_literal=True)
+    def add_shifted(typing_context: Any, pack: Any, level: Any) -> Any:
+        """Do one level of `scan` within a pack."""
+        places = SCAN[level.literal_value]
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(places))
+            return builder.fadd(args[0], builder.shuffle_vector(args[0], _NOTHING, mask))
+
+        return pack_type(pack, level), generate
+
+    @intrinsic
+    def last_of(typing_context: Any, pack: Any) -> Any:
+        """Take the number in the last place of a pack."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return builder.extract_element(args[0], ir.IntType(32)(LANES - 1))
+
+        return types.float64(pack), generate
+
+    @intrinsic
+    def fold(typing_context: Any, pack: Any) -> Any:
+        """Add up a pack: halves onto each other until one number is left."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            total, width = args[0], LANES
+            while width > 1:
+                width //= 2
+                low = [ir.Constant(ir.IntType(32), j) for j in range(width)]
+                high = [ir.Constant(ir.IntType(32), j + width) for j in range(width)]
+                kind = ir.VectorType(ir.IntType(32), width)
+                parts = (
+                    builder.shuffle_vector(total, total, ir.Constant(kind, half))
+                    for half in (low, high)
+                )
+                total = builder.fadd(*parts)
+            return builder.extract_element(total, ir.Constant(ir.IntType(32), 0))
+
+        return types.float64(pack), generate
 
     @intrinsic
     def store(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
@@ -115,7 +301,7 @@ else:
             row = context.cast(builder, args[1], row_type, types.intp)
             if isinstance(value, PackType):
                 row = builder.mul(row, ir.Constant(row.type, LANES))
-            pointer = _row_pointer(context, builder, array_type, args[0], row)
+            pointer = _pointer(context, builder, array_type, args[0], row)
             if isinstance(value, PackType):
                 pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
             builder.store(args[2], pointer, align=8)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numba
@@ -118,7 +120,7 @@ def test_an_edit_elsewhere_keeps_the_compiled_kernels(copied_package):
 
 def test_every_file_with_a_kernel_is_in_the_digest():
     for file in PACKAGE.rglob("*.py"):
-        uses = "_jit import" in file.read_text()
+        uses = re.search(r"_jit import [^\n]*\bjit\b", file.read_text())
         assert not uses or file.parent.name in _jit._KERNEL_FOLDERS, file
 
 
@@ -152,6 +154,23 @@ def test_cache_folder_follows_the_environment(tmp_path, monkeypatch):
     expected = tmp_path / "user" / "chimera_hpc" / "numba" / source_digest()
     assert cache_folder.__wrapped__() == str(expected)
     assert expected.is_dir()
+
+
+def test_cache_folders_of_other_sources_go_when_unused_for_long(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    ours, old, broken_off = source_digest(), "0" * 16, f"{'1' * 16}.{'a' * 32}.old"
+    kept = [ours, "2" * 16, "somebody_elses", "3" * 15]
+    for name in [*kept, old, broken_off]:
+        (tmp_path / name / "kernel").mkdir(parents=True)
+        (tmp_path / name / "kernel" / "code.nbc").write_text("")
+        long_ago = time.time() - (29 if name == "2" * 16 else 31) * 86400
+        os.utime(tmp_path / name, (long_ago, long_ago))
+    before = time.time()
+    assert cache_folder.__wrapped__() == str(tmp_path / ours)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(kept)
+    assert (tmp_path / ours / "kernel" / "code.nbc").exists()
+    # Its use is seen by later processes.
+    assert (tmp_path / ours).stat().st_mtime > before - 2
 
 
 def test_cache_folder_that_cannot_be_made_is_replaced(tmp_path, monkeypatch):

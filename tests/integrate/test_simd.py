@@ -9,7 +9,22 @@ import numpy as np
 import pytest
 from kernel_tools import compiled
 
-from chimera_hpc.integrate.simd import LANES, larger, load, magnitude, splat, store
+from chimera_hpc.integrate.simd import (
+    LANES,
+    across,
+    add_shifted,
+    fold,
+    larger,
+    last_of,
+    load,
+    load_at,
+    load_some,
+    magnitude,
+    splat,
+    store,
+    store_at,
+    store_some,
+)
 
 # Numbers with which arithmetic goes wrong first, and some ordinary ones.
 SPECIAL = [0.0, -0.0, 1.0, -1.5, np.inf, -np.inf, np.nan, 5e-324, 1e308, -1e-308, 1 / 3, -7e22]
@@ -111,3 +126,45 @@ def test_rows_are_read_and_written_where_they_are():
     expected = a[[4, 1, 2, 3, 0]].copy()
     swap(a)
     np.testing.assert_array_equal(a, expected)
+
+
+@numba.njit
+def neighbours(work, array, offset, low, high, out):
+    whole = load_at(array, offset)
+    store_at(out, 0, whole)
+    store_at(out, 8, load_some(array, offset, low, high))
+    store_some(out, 16, whole, high)
+    store_at(out, 24, add_shifted(add_shifted(add_shifted(whole, 0), 1), 2))
+    store_at(out, 32, across(work, array, 2))
+    out[40, 0] = fold(whole)
+    out[41, 0] = last_of(whole)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 0), (0, 8), (0, 3), (5, 8), (2, 6)])
+def test_packs_of_neighbouring_rows(low, high):
+    array = np.random.default_rng(0).normal(size=(40, 1))
+    out = np.full((48, 1), 7.0)
+    neighbours(0.0, array, 11, low, high, out)
+    rows = array[11:19, 0]
+    inside = (np.arange(8) >= low) & (np.arange(8) < high)
+    assert out[:8, 0].tolist() == rows.tolist()
+    assert out[8:16, 0].tolist() == np.where(inside, rows, 0.0).tolist()
+    assert np.signbit(out[8:16, 0][~inside]).all()
+    assert out[16:24, 0].tolist() == [*rows[:high], *[7.0] * (8 - high)]
+    np.testing.assert_allclose(out[24:32, 0], np.cumsum(rows), rtol=1e-14, atol=1e-15)
+    assert (out[32:40, 0] == array[2, 0]).all()
+    assert out[40, 0] == pytest.approx(rows.sum(), rel=1e-14)
+    assert out[41, 0] == rows[7]
+
+
+def test_what_is_not_loaded_is_not_touched():
+    # A ring's end: the places before the array's first and behind its last number are masked out.
+    array = np.arange(8.0).reshape(8, 1)
+    out = np.zeros((48, 1))
+
+    @numba.njit
+    def ends(array, out):
+        store_at(out, 0, load_some(array, 5, 0, 3) + load_some(array, -3, 3, 8))
+
+    ends(array, out)
+    assert out[:8, 0].tolist() == [5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0]

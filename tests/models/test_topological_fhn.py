@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import naive
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_tools import run_all
 
+from chimera_hpc.errors import BadInput
 from chimera_hpc.integrate.driver import Control
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.topological_fhn import TopologicalFHN
@@ -38,6 +40,12 @@ def reference(case):
 def random_state(topology, seed=0, size=1.0):
     random = np.random.default_rng(seed)
     return (size * random.uniform(-1, 1, n) for n in (topology.n_nodes, topology.n_links))
+
+
+@pytest.mark.parametrize("epsilon", [0.0, -0.05, math.nan])
+def test_time_scale_that_is_none_is_refused(epsilon):
+    with pytest.raises(BadInput, match=f"epsilon = {epsilon}: must be above 0"):
+        TopologicalFHN(Topology.ring(5, 1), epsilon=epsilon)
 
 
 # --- right-hand sides -----------------------------------------------------------------------------
@@ -73,6 +81,23 @@ def test_right_hand_side_equals_the_dense_one_in_every_lane(models):
         expected = twin(y[:, lane], m.topology.links, m.n_nodes, m.epsilon, m.b, m.c)
         scale = np.abs(expected).max()
         np.testing.assert_allclose(dy[:, lane], expected, rtol=0, atol=1e-13 * scale)
+
+
+@pytest.mark.parametrize("n", [3, 7, 8, 9, 15, 16, 17, 24, 50])
+def test_slopes_of_a_lane_alone_have_the_bits_of_a_pack(n):
+    # Alone, eight neighbours go together; in a pack, the same node of eight rings.
+    for half in range(1, (n - 1) // 2 + 1):
+        model = TopologicalFHN(Topology.ring(n, half).reorient_node(0, half))
+        y = np.random.default_rng(half).normal(size=(2 * n, LANES))
+        params = np.repeat(model.lane_params[:, None], LANES, axis=1)
+        together = np.empty_like(y)
+        model.right_hand_side(y, together, params, model.int_params)
+        for lane in range(LANES):
+            alone = np.empty((2 * n, 1))
+            column = np.ascontiguousarray(y[:, lane : lane + 1])
+            model.right_hand_side(column, alone, params[:, :1].copy(), model.int_params)
+            assert alone[:, 0].tobytes() == together[:, lane].tobytes()
+
 
 
 @forms
