@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 _WARNINGS = "PYTHONWARNINGS"
+_CLOSE_SECONDS = 30.0
 
 ONE_THREAD = {
     name: "1"
@@ -41,6 +42,9 @@ def settings(patience: float = 60.0) -> dict[str, Any]:
         "distributed.scheduler.allowed-failures": 1_000_000,
         # A worker that hangs (stopped, or its node gone) is given up after this time.
         "distributed.scheduler.worker-ttl": f"{patience}s",
+        # A worker that died is replaced by its nanny, however long that takes on a busy machine;
+        # Dask would give up the nanny, and with it a worker that has just come up.
+        "distributed.deploy.lost-worker-timeout": "30d",
         # A block belongs to the worker that claimed it.
         "distributed.scheduler.work-stealing": False,
         "distributed.nanny.pre-spawn-environ": ONE_THREAD,
@@ -87,10 +91,8 @@ def local_cluster(
     import dask
     from distributed import Client, LocalCluster
 
-    with (
-        dask.config.set(settings(patience)),
-        _quiet_tracker(),
-        LocalCluster(
+    with dask.config.set(settings(patience)), _quiet_tracker():
+        cluster = LocalCluster(
             n_workers=workers or usable_cores(),
             threads_per_worker=1,
             processes=True,
@@ -100,15 +102,17 @@ def local_cluster(
             memory_limit=memory_limit,
             local_directory=None if scratch is None else str(scratch),
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        _prepare(client)
+        )
         try:
-            yield client
-        except KeyboardInterrupt:
-            _kill_workers(cluster)
-            raise
+            with Client(cluster) as client:
+                _prepare(client)
+                try:
+                    yield client
+                except KeyboardInterrupt:
+                    _kill_workers(cluster)
+                    raise
+        finally:
+            _close(cluster)
 
 
 @contextmanager
@@ -172,6 +176,14 @@ def _prepare(client: Client) -> None:
         # Workers that somebody else has started: they may lack anything.
         text = " ".join(f"{type(error).__name__}: {error}".split())
         raise BadInput(f"the workers cannot use this package: {text}") from None
+
+
+def _close(cluster: LocalCluster) -> None:
+    """Close a cluster; one that does not close, as after a worker was lost, is left behind."""
+    try:
+        cluster.close(timeout=_CLOSE_SECONDS)
+    except TimeoutError:
+        _kill_workers(cluster)
 
 
 def _kill_workers(cluster: LocalCluster) -> None:

@@ -20,7 +20,7 @@ from chimera_hpc.plot.density import density_classes
 from chimera_hpc.plot.incoherence import Strengths, incoherence, incoherence_sensitivity
 from chimera_hpc.plot.network import networks
 from chimera_hpc.plot.robustness import Band, robustness
-from chimera_hpc.plot.spacetime import space_time
+from chimera_hpc.plot.spacetime import last_part, space_time
 from chimera_hpc.plot.spectrum import Spectrum, spectrum
 from chimera_hpc.plot.stability import stability
 from chimera_hpc.plot.synthetic import reconstruction
@@ -102,7 +102,10 @@ def draw_incoherence(outcome: Outcome) -> Figure | None:
         )
         for made in entry[entry["unit"]]["by_delta"]
     ]
-    dynamics = (outcome.shown[-1].t, outcome.shown[-1].u) if outcome.shown else None
+    dynamics = None
+    if outcome.shown:
+        run = outcome.shown[-1]
+        dynamics = last_part(run.t, run.u, run.close_up) if run.is_fast else (run.t, run.u)
     return incoherence(panels, label=label, dynamics=dynamics)
 
 

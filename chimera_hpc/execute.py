@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING
 
-from chimera_hpc.work import BlockReceipt, Orders, Trouble, do_block
+from chimera_hpc.work import BlockReceipt, Orders, Trouble, do_block, tell_to_stop
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -188,11 +188,3 @@ class _Window:
             return len(self.client.scheduler_info(n_workers=-1)["workers"])
         except (OSError, TimeoutError, ValueError, RuntimeError):
             return 0
-
-
-def tell_to_stop(orders: Orders) -> None:
-    """Tell all workers of a run to stop in good order; on a full disk they find out themselves."""
-    try:
-        orders.stop_file.touch()
-    except OSError:
-        return

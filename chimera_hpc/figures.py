@@ -12,11 +12,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from chimera_hpc.curve_figures import CURVE_FIGURES
-from chimera_hpc.features import FEATURES as LABELS
 from chimera_hpc.grid.selection import split_figure_name
 from chimera_hpc.outcome import Outcome, Run
 from chimera_hpc.plot.classification import (
@@ -25,16 +23,12 @@ from chimera_hpc.plot.classification import (
     classification_map,
 )
 from chimera_hpc.plot.dendrogram import dendrogram
-from chimera_hpc.plot.indicators import Profiles, fourier_indicators
+from chimera_hpc.plot.indicators import fourier_indicators, profiles_of
 from chimera_hpc.plot.modes import class_against, class_map
 from chimera_hpc.plot.projections import projections
 from chimera_hpc.plot.spacetime import space_time
 
 Array = NDArray[np.float64]
-
-_PERIODS = 12
-"""Periods in the close-up of a space-time plot."""
-
 
 Maker = Callable[[Outcome], Figure | None]
 CutMaker = Callable[[Outcome, int], Figure | None]
@@ -46,16 +40,18 @@ def draw_space_time(outcome: Outcome) -> Figure | None:
         return None
     panels = [(run.t, run.u) for run in outcome.shown]
     titles = [run.title for run in outcome.shown]
-    return _with_few_ticks(space_time(panels, titles, zoom=_close_up(outcome.shown)))
+    fast = any(run.is_fast for run in outcome.shown)
+    zoom = [run.close_up for run in outcome.shown] if fast else None
+    return space_time(panels, titles, zoom=zoom)
 
 
 def draw_indicators(outcome: Outcome) -> Figure | None:
     """Draw the Fourier indicators of the runs to show that oscillate (paper fig:9fourier)."""
-    runs = [run for run in outcome.shown if run.features is not None]
+    runs = [(run, run.features) for run in outcome.shown if run.features is not None]
     if not runs:
         return None
-    titles = [f"{run.title}{_variations(run)}" for run in runs]
-    return fourier_indicators([_profiles(run) for run in runs], titles)
+    titles = [f"{run.title}{_variations(run)}" for run, _ in runs]
+    return fourier_indicators([profiles_of(features) for _, features in runs], titles)
 
 
 def draw_whole_run(outcome: Outcome) -> Figure | None:
@@ -169,31 +165,7 @@ def _votes(cells: Sequence[Mapping[str, Any]]) -> list[Mapping[str, int]]:
     return [cell["votes"] for cell in cells]
 
 
-def _close_up(runs: Sequence[Run]) -> float | None:
-    """Return how long a close-up of the slowest run is; None when all of the series is short."""
-    frequencies = [run.frequency for run in runs if run.frequency > 0.0]
-    if not frequencies:
-        return None
-    duration = _PERIODS / min(frequencies)
-    return duration if all(duration < 0.5 * (run.t[-1] - run.t[0]) for run in runs) else None
-
-
-def _with_few_ticks(figure: Figure) -> Figure:
-    """Label times so that the labels of neighbouring panels stay apart."""
-    for axes in figure.axes:
-        if axes.get_images():
-            axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    return figure
-
-
 def _variations(run: Run) -> str:
     if run.triplet is None:
         return ""
     return f"\n$V$ = ({', '.join(f'{value:.3f}' for value in run.triplet)})"
-
-
-def _profiles(run: Run) -> Profiles:
-    assert run.features is not None
-    rows = dict(zip(LABELS, run.features, strict=True))
-    names = ("phase", "amplitude", "frequency")
-    return Profiles(**{n: rows[n] for name in names for n in (name, f"{name}_std")})

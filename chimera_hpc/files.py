@@ -18,6 +18,8 @@ from pathlib import Path
 
 from chimera_hpc.processes import is_gone, process_mark
 
+HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
+"""Errors that the next write would run into as well."""
 _SUFFIX = ".partial"
 LEFTOVER_AGE = 3600.0
 """Seconds after which the temporary file of an unknown process counts as left over."""

@@ -35,6 +35,8 @@ METADATA = "zarr.json"
 METADATA_COPY = "zarr.json.copy"
 """The same, with the crc32c of the metadata that it replaced and one of all that behind it."""
 _CHECKSUM_BYTES = 4
+_KNOWN = np.isin(np.arange(256), [int(status) for status in Status])
+"""Whether each byte is the code of a status."""
 
 
 @dataclass(frozen=True)
@@ -192,8 +194,15 @@ def digests(features: ArrayLike, scalars: ArrayLike) -> NDArray[np.int64]:
     The digest runs over the stored bytes (`canonical`) of the point's features, then of its
     scalars; times and attempts do not enter.
     """
-    rows = zip(canonical(features), canonical(scalars), strict=True)
-    return np.array([_digest(row.tobytes() + more.tobytes()) for row, more in rows], dtype=np.int64)
+    return stored_digests(canonical(features), canonical(scalars))
+
+
+def stored_digests(
+    features: NDArray[np.float64], scalars: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return what `digests` does, of values that are `canonical` already."""
+    rows = zip(features, scalars, strict=True)
+    return np.array([_digest(row, more) for row, more in rows], dtype=np.int64)
 
 
 def point_digest(features: ArrayLike, scalars: ArrayLike) -> int:
@@ -226,8 +235,11 @@ def _parse(data: bytes) -> dict[str, Any] | None:
     return dict(root) if whole else None
 
 
-def _digest(data: bytes) -> int:
-    return int.from_bytes(blake2b(data, digest_size=8).digest(), "little", signed=True)
+def _digest(*parts: NDArray[np.float64]) -> int:
+    hashed = blake2b(digest_size=8)
+    for part in parts:
+        hashed.update(part.data)
+    return int.from_bytes(hashed.digest(), "little", signed=True)
 
 
 def _chunks(folder: Path, n_blocks: int) -> list[tuple[int, str]]:
@@ -245,4 +257,12 @@ def _read_chunk(path: str, block_size: int) -> NDArray[np.int64] | None:
     except OSError:
         return None
     data = unseal(sealed or b"", block_size * len(FIELDS) * 8)
-    return None if data is None else np.frombuffer(data, "<i8").reshape(block_size, len(FIELDS))
+    if data is None:
+        return None
+    rows = np.frombuffer(data, "<i8").reshape(block_size, len(FIELDS))
+    return rows if _are_statuses(rows[:, 0]) else None
+
+
+def _are_statuses(codes: NDArray[np.int64]) -> bool:
+    """Whether all of these are codes of `Status`, as in every chunk that was written by us."""
+    return codes.min() >= 0 and codes.max() < len(_KNOWN) and bool(_KNOWN[codes].all())

@@ -14,6 +14,9 @@ from chimera_hpc.reduce.classify import Classification
 
 Array = NDArray[np.float64]
 
+_PERIODS = 12
+"""Periods in the close-up of a run."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -42,6 +45,17 @@ class Run:
         if self.features is None:
             return float("nan")
         return float(np.median(self.features[LABELS.index("frequency")]))
+
+    @property
+    def close_up(self) -> float:
+        """Time of the last twelve periods, at most half of the series."""
+        half = 0.5 * float(self.t[-1] - self.t[0])
+        return min(_PERIODS / self.frequency, half) if self.frequency > 0.0 else half
+
+    @property
+    def is_fast(self) -> bool:
+        """Whether twelve periods take less than half of the series: drawn whole, it blurs."""
+        return self.close_up < 0.5 * float(self.t[-1] - self.t[0])
 
 
 @dataclass(frozen=True)

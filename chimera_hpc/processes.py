@@ -17,8 +17,7 @@ def process_mark() -> str:
     It may stand in a file name. `start` is the kernel's start time of the process in clock ticks
     after boot, or 0 where the system does not tell (no ``/proc``).
     """
-    pid = os.getpid()
-    return f"{_machine()}-{pid}-{_started(pid) or 0}"
+    return _mark(os.getpid())
 
 
 def is_gone(mark: str) -> bool:
@@ -33,6 +32,15 @@ def is_gone(mark: str) -> bool:
         return False
     started = _started(int(pid))
     return started is None or started != int(start)
+
+
+@lru_cache(maxsize=1)
+def _mark(pid: int) -> str:
+    return f"{_machine()}-{pid}-{_started(pid) or 0}"
+
+
+# A late descendant may have the number of an ancestor that is gone.
+os.register_at_fork(after_in_child=_mark.cache_clear)
 
 
 @lru_cache(maxsize=1)

@@ -110,7 +110,7 @@ class Reporter:
         rate = self._counted / max(now - self._began, 1e-9)
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self.done, rate=f"{rate:.1f}/s")
-        elif now - self._last_line > LINE_SECONDS or self.done >= self.total:
+        elif (self._counted and now - self._last_line > LINE_SECONDS) or self.done >= self.total:
             self._last_line = now
             left = max(0, self.total - self.done) / max(rate, 1e-9)
             failures = f", {self.failed} failed" if self.failed else ""

@@ -10,6 +10,7 @@ import re
 import socket
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
@@ -35,12 +36,13 @@ _SLURM = (
 _GIT_SECONDS = 5.0
 
 
-def gather() -> dict[str, Any]:
-    """Return what `runs/<number>.json` records: plain values for JSON.
+def gather(model: str = "") -> dict[str, Any]:
+    """Return what `runs/<number>.json` records of a run of this model: plain values for JSON.
 
     Keys: package (name, version), source (digest of the package's own code), git (commit, dirty;
     None outside a checkout), python, libraries, machine (host, CPU, cores, system), user, process,
-    command, folder, started (UTC), slurm (those of its variables that are set).
+    command, folder, started (UTC), slurm (those of its variables that are set); model (name and
+    digest of its source) where it is a user's own.
     """
     return {
         "package": {"name": PACKAGE.name, "version": __version__},
@@ -60,6 +62,7 @@ def gather() -> dict[str, Any]:
         "folder": os.getcwd(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "slurm": {name: os.environ[name] for name in _SLURM if name in os.environ},
+        **model_source(model),
     }
 
 
@@ -68,7 +71,8 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     lines = []
     for key in ("package", "source", "model", "python", "libraries"):
         lines += _lines(key, before.get(key), now.get(key))
-    cpus = [dict(run.get("machine") or {}).get("cpu") for run in (before, now)]
+    machines = [run.get("machine") for run in (before, now)]
+    cpus = [machine.get("cpu") if isinstance(machine, dict) else None for machine in machines]
     return lines + _lines("cpu", *cpus)
 
 
@@ -113,13 +117,31 @@ def cpu_model() -> str:
 
 
 def model_source(model: str) -> dict[str, str]:
-    """Return what to record of a user's model, `package.module:object`; nothing of another one."""
+    """Return what to record of a user's model, `package.module:object`; nothing of another one.
+
+    The digest is over the source files of its package, or over that of the module and of those
+    that were imported from the same folder.
+    """
     module = sys.modules.get(model.partition(":")[0])
     path = getattr(module, "__file__", None)
     if ":" not in model or path is None:
         return {}
-    digest = blake2b(Path(path).read_bytes(), digest_size=8).hexdigest()
-    return {"model": f"{model}, source {digest}"}
+    total = blake2b(digest_size=8)
+    for file in _model_files(model.partition(":")[0], Path(path)):
+        total.update(f"{file.name}\0".encode() + file.read_bytes())
+    return {"model": f"{model}, source {total.hexdigest()}"}
+
+
+def _model_files(module: str, path: Path) -> list[Path]:
+    top = getattr(sys.modules[module.partition(".")[0]], "__path__", None)
+    if top is not None:
+        return sorted(file for folder in top for file in Path(folder).rglob("*.py"))
+    installed = set(sysconfig.get_paths().values())
+    if str(path.parent) in installed:
+        return [path]
+    loaded = (getattr(other, "__file__", None) for other in [*sys.modules.values()])
+    beside = {Path(file) for file in loaded if file and Path(file).parent == path.parent}
+    return sorted({path, *(file for file in beside if file.suffix == ".py")})
 
 
 def _lines(key: str, before: object, now: object) -> list[str]:

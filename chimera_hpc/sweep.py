@@ -17,10 +17,10 @@ _EXITS = """exit status:
 """
 
 
-def parser() -> ArgumentParser:
-    """Return the parser of the whole command line."""
+def parser(program: str = "python -m chimera_hpc.sweep") -> ArgumentParser:
+    """Return the parser of the whole command line, called by this name."""
     top = ArgumentParser(
-        prog="python -m chimera_hpc.sweep",
+        prog=program,
         description="Parameter sweeps of oscillator networks: integrate, store, classify, draw.",
         epilog="Each command has its own --help with examples.\n\n" + _EXITS,
         formatter_class=RawDescriptionHelpFormatter,
@@ -44,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
     args = parser().parse_args(arguments)
     args.typed = sys.argv[1:] if arguments is None else list(arguments)
+    args.parser_named = parser
     try:
         return int(args.execute(args))
     except BadInput as error:

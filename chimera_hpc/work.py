@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.claims import Claim, ClaimLost, LostAttempt, claim_block, forget_points
+from chimera_hpc.files import HOPELESS
 from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.ledger import METADATA, NO_LIMIT
 from chimera_hpc.provenance import cpu_model
@@ -155,9 +156,18 @@ def do_block(
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
         trouble = _trouble(f"{error.strerror or error}{where}", error.errno)
+        if error.errno in HOPELESS:
+            # Before a worker computes the next block in its queue for nothing.
+            tell_to_stop(orders)
     except Exception as error:
         trouble = _trouble(_in_a_line(error))
     return BlockReceipt(block, trouble=trouble, machine=_machine())
+
+
+def tell_to_stop(orders: Orders) -> None:
+    """Tell all workers of a run to stop in good order; on a full disk they find out themselves."""
+    with suppress(OSError):
+        orders.stop_file.touch()
 
 
 def hand_back_all() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,8 @@ settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 FOLDER = Path(__file__).parent
 SLURM_PROGRAMS = ("slurmctld", "slurmd", "sbatch", "munged")
+BROWSER_PROGRAMS = ("chromium", "chromedriver")
+_NEEDS = {"slurm": ("SLURM", SLURM_PROGRAMS), "chromium": ("CHROMIUM", BROWSER_PROGRAMS)}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,14 +43,16 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("--run-slow"):
         _skip(items, "slow", "slow: runs with --run-slow")
-    missing = _missing_slurm_programs()
-    if missing and os.environ.get("REQUIRE_SLURM") != "1":
-        _skip(items, "slurm", f"no SLURM on this machine: {', '.join(missing)} not found")
+    for marker, (name, programs) in _NEEDS.items():
+        missing = _missing(programs)
+        if missing and os.environ.get(f"REQUIRE_{name}") != "1":
+            _skip(items, marker, f"no {name} on this machine: {', '.join(missing)} not found")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    if item.get_closest_marker("slurm") and (missing := _missing_slurm_programs()):
-        pytest.fail(f"REQUIRE_SLURM=1, but {', '.join(missing)} not found", pytrace=False)
+    for marker, (name, programs) in _NEEDS.items():
+        if item.get_closest_marker(marker) and (missing := _missing(programs)):
+            pytest.fail(f"REQUIRE_{name}=1, but {', '.join(missing)} not found", pytrace=False)
 
 
 def _skip(items: list[pytest.Item], marker: str, reason: str) -> None:
@@ -57,9 +61,9 @@ def _skip(items: list[pytest.Item], marker: str, reason: str) -> None:
             item.add_marker(pytest.mark.skip(reason=reason))
 
 
-def _missing_slurm_programs() -> list[str]:
+def _missing(programs: Sequence[str]) -> list[str]:
     path = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/sbin"))
-    return [name for name in SLURM_PROGRAMS if shutil.which(name, path=path) is None]
+    return [name for name in programs if shutil.which(name, path=path) is None]
 
 
 @pytest.fixture(scope="module")

@@ -48,8 +48,11 @@ KillWait=4
 MinJobAge=300
 SlurmdTimeout=30
 MaxArraySize=9
+PreemptType=preempt/partition_prio
+PreemptMode=REQUEUE
 {nodes}
 PartitionName=debug Nodes=ALL Default=YES MaxTime=60 State=UP
+PartitionName=urgent Nodes=ALL PriorityTier=9 MaxTime=60 State=UP
 PartitionName=closed Nodes=ALL MaxTime=60 State=DOWN
 """
 
@@ -154,10 +157,14 @@ class Slurm:
 
     def exit_code(self, job: str) -> int:
         """Return the exit code of a job that has ended."""
-        text = self.sh("scontrol", "show", "job", job)
-        return int(text.split("ExitCode=")[1].split(":")[0])
+        return int(self.told(job, "ExitCode").split(":")[0])
 
-    def wait(self, seconds: float = 100) -> None:
+    def told(self, job: str, key: str) -> str:
+        """Return what SLURM says of a job under a key such as ``RunTime``."""
+        text = self.sh("scontrol", "show", "job", job)
+        return text.split(f" {key}=")[1].split()[0]
+
+    def wait(self, seconds: float = 240) -> None:
         """Wait until the queue is empty."""
         self.until(lambda: not self.queue(), seconds, "the queue did not become empty")
 

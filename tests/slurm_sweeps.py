@@ -41,6 +41,10 @@ array = 4
 """
 
 
+LONG = 6000.0
+"""Time of runs that let a sweep last for some four seconds on two cores."""
+
+
 def write_job(folder: Path, t_end: float = 100.0, block: int = 4) -> Path:
     """Write a job of 64 points."""
     path = folder / "small.toml"
@@ -63,6 +67,13 @@ def sweep(*words: object, timeout: float = 120) -> subprocess.CompletedProcess[s
 def digests(folder: Path) -> np.ndarray[Any, Any]:
     """Return the digest of every point in a sweep's folder."""
     return read_ledger(folder / "store.zarr")["digest"]
+
+
+def rows_done(folder: Path) -> dict[int, tuple[int, ...]]:
+    """Return the ledger's rows of the points that have an end, times and run included, by point."""
+    columns = read_ledger(folder / "store.zarr")
+    done = np.flatnonzero(columns["status"] != 255)
+    return {int(i): tuple(int(column[i]) for column in columns.values()) for i in done}
 
 
 def n_done(folder: Path) -> int:

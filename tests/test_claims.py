@@ -251,11 +251,30 @@ def test_only_processes_of_this_machine_are_declared_gone() -> None:
         assert not is_gone(odd)
 
 
+def test_a_forked_process_has_a_mark_of_its_own() -> None:
+    ours = process_mark()
+    reader, writer = os.pipe()
+    child = os.fork()
+    if not child:
+        os.write(writer, process_mark().encode())
+        os._exit(0)
+    os.waitpid(child, 0)
+    machine = ours.partition("-")[0]
+    mark = os.read(reader, 100).decode()
+    os.close(reader)
+    os.close(writer)
+    assert mark.startswith(f"{machine}-{child}-")
+    assert mark != ours
+    assert is_gone(mark)
+
+
 def test_without_proc_only_the_number_counts(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(processes, "_PROC", tmp_path)
-    processes._machine.cache_clear()
+    for known in (processes._machine, processes._mark):
+        known.cache_clear()
     mark = process_mark()
     assert mark.endswith(f"-{os.getpid()}-0")
     assert not is_gone(mark)
     assert is_gone(mark.replace(f"-{os.getpid()}-", "-4194303-"))
-    processes._machine.cache_clear()
+    for known in (processes._machine, processes._mark):
+        known.cache_clear()

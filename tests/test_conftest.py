@@ -43,6 +43,12 @@ def test_missing_slurm_skips_unless_it_is_required(tmp_path):
     assert outcome(tmp_path, SLURM, PATH=nowhere, REQUIRE_SLURM="1").startswith("1 error")
 
 
+def test_missing_chromium_skips_unless_it_is_required(tmp_path):
+    nowhere, test = str(tmp_path), SLURM.replace("slurm", "chromium")
+    assert outcome(tmp_path, test, PATH=nowhere, REQUIRE_CHROMIUM="0").startswith("1 skipped")
+    assert outcome(tmp_path, test, PATH=nowhere, REQUIRE_CHROMIUM="1").startswith("1 error")
+
+
 def test_unknown_markers_and_warnings_are_errors(tmp_path):
     unknown = "@pytest.mark.no_such_marker\ndef test_it():\n    pass\n"
     warning = "import warnings\ndef test_it():\n    warnings.warn('careful', stacklevel=1)\n"

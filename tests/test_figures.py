@@ -96,7 +96,7 @@ def test_space_time_shows_each_run_over_a_close_up_of_twelve_periods():
     images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
     assert len(images) == 4
     starts = [round(float(image.get_extent()[0]), 1) for image in images]
-    assert starts == [0.0, 0.0, 14.0, 14.0]  # the slower run has a period of 0.5
+    assert starts == [0.0, 0.0, 17.0, 14.0]  # periods of 0.25 and 0.5
 
 
 @pytest.mark.parametrize("draw", [figures.draw_space_time, figures.draw_indicators])
@@ -133,6 +133,13 @@ def test_indicators_tell_the_variations_and_leave_out_still_runs():
     assert drawn.axes[0].get_title().endswith("$V$ = (0.575, 0.018, 0.012)")
     (dots,) = drawn.axes[2].lines
     np.testing.assert_array_equal(dots.get_ydata(), np.full(8, 4.0))
+
+
+def test_slow_run_beside_a_fast_one_is_drawn_over_half_of_its_series():
+    drawn = figures.draw_space_time(outcome(shown=[run("one"), run("slow", 0.1)]))
+    images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
+    starts = [round(float(image.get_extent()[0]), 1) for image in images]
+    assert starts == [0.0, 0.0, 17.0, 10.0]
 
 
 def test_still_run_has_no_close_up():

@@ -27,6 +27,7 @@ LAYERS = (
     "status",
     "processes",
     "files",
+    "shipped",
     "topology",
     "streams",
     "grid",
@@ -50,6 +51,8 @@ LAYERS = (
     "outputs.selection",
     "analyses",
     "outputs",
+    "replay",
+    "recordings",
     "paper",
     "report",
     "slurm.queue",
@@ -250,7 +253,11 @@ def declared(*extras: str) -> list[Requirement]:
 
 @pytest.mark.parametrize(
     ("name", "extras"),
-    [("requirements.lock", ("slurm", "dev")), ("requirements-bench.lock", ("bench",))],
+    [
+        ("requirements.lock", ("slurm", "dev", "completion")),
+        ("requirements-bench.lock", ("bench",)),
+        ("requirements-docs.lock", ("docs",)),
+    ],
 )
 def test_lock_file_pins_what_pyproject_declares(name, extras):
     entries, text = locked(name)
@@ -261,19 +268,23 @@ def test_lock_file_pins_what_pyproject_declares(name, extras):
     assert not re.search(r"://|^\s*--(?!hash=sha256:[0-9a-f]{64})", text, flags=re.MULTILINE)
 
 
-@pytest.mark.parametrize("name", ["requirements.lock", "requirements-bench.lock"])
+@pytest.mark.parametrize(
+    "name", ["requirements.lock", "requirements-bench.lock", "requirements-docs.lock"]
+)
 def test_every_pin_has_a_hash(name):
     _, text = locked(name)
     pins = re.findall(r"^([a-zA-Z][^\n]*)((?:\n +--hash=\S+(?: \\)?)*)", text, flags=re.MULTILINE)
     assert [pin for pin, hashes in pins if not hashes] == []
 
 
-def test_both_lock_files_agree():
-    base, bench = locked("requirements.lock")[0], locked("requirements-bench.lock")[0]
+@pytest.mark.parametrize("name", ["requirements-bench.lock", "requirements-docs.lock"])
+def test_lock_files_agree(name):
+    base, more = locked("requirements.lock")[0], locked(name)[0]
     different = {
-        name
-        for name in base.keys() & bench.keys()
-        if set(map(str, base[name])) != set(map(str, bench[name]))
+        package
+        for package in base.keys() & more.keys()
+        if {str(pin.specifier) for pin in base[package]}
+        != {str(pin.specifier) for pin in more[package]}
     }
     assert different == set()
 
@@ -297,5 +308,5 @@ def test_wheel_carries_jobs_and_type_marker(tmp_path):
         f"chimera_hpc/{path.relative_to(ROOT).as_posix()}" for path in ROOT.glob("jobs/**/*.toml")
     }
     assert jobs
-    assert names >= jobs | {"chimera_hpc/py.typed"}
+    assert names >= jobs | {"chimera_hpc/py.typed", "chimera_hpc/report/templates/report.html"}
     assert {name.partition("/")[0].partition("-")[0] for name in names} == {"chimera_hpc"}

@@ -43,6 +43,17 @@ def test_plain_lines_come_at_intervals_and_at_the_end(monkeypatch: pytest.Monkey
     ]
 
 
+def test_no_time_to_go_is_told_before_any_point_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    stream = io.StringIO()
+    with Reporter(8, stream=stream) as reporter:
+        for n_done in (0, 4):
+            now += 20.0
+            reporter.add(n_done, 0)
+    assert stream.getvalue().splitlines() == ["4 of 8 points, 0.2 points/s, 20 s to go"]
+
+
 def test_log_gets_every_line_with_its_time(tmp_path: Path) -> None:
     with Reporter(10, tmp_path / "run.log", io.StringIO()) as reporter:
         reporter.say("to be seen")

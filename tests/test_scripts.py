@@ -174,7 +174,9 @@ def test_orphans_of_a_killed_call_are_waited_for(tmp_path):
     _, errors = process.communicate(timeout=240)
     victim.communicate()
     assert process.returncode == 0
-    assert errors.startswith("another call is setting up the environment; waiting for it\nsetting up ")
+    assert errors.startswith(
+        "another call is setting up the environment; waiting for it\nsetting up "
+    )
 
 
 @pytest.mark.slow

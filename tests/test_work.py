@@ -165,10 +165,14 @@ def test_error_of_the_system_is_told_and_the_block_handed_back(
         raise OSError(errno.ENOSPC, "No space left on device", "u/c.0")
 
     monkeypatch.setattr(Store, "write_block", full)
+    orders(store).stop_file.parent.mkdir(exist_ok=True)
     receipt = do_block(orders(store), 0)
     assert receipt.trouble is not None
     assert receipt.trouble.errno == errno.ENOSPC
     assert receipt.trouble.text == "No space left on device (u/c.0)"
+    # No worker of this run begins another block.
+    assert do_block(orders(store), 1).stopped
+    orders(store).stop_file.unlink()
     monkeypatch.undo()
     compute(lambda sweep, points, _: done(sweep, points))
     assert do_block(orders(store), 0).n_done == 4

@@ -12,6 +12,8 @@ from typing import Protocol
 
 from chimera_hpc.commands import (
     cancel,
+    classify,
+    completion,
     export,
     extend,
     merge,
@@ -19,10 +21,13 @@ from chimera_hpc.commands import (
     reduce,
     retry,
     run,
+    schema,
     shard,
+    show,
     slurm,
     status,
     verify,
+    watch,
     why,
 )
 
@@ -39,7 +44,8 @@ class Command(Protocol):
 
 
 COMMANDS: tuple[Command, ...] = (
-    *(run, plan, status, reduce),
+    *(run, plan, status, watch, reduce, show, classify),
     *(retry, why, verify, extend, merge, export),
     *(slurm, shard, cancel),
+    *(schema, completion),
 )

@@ -14,6 +14,7 @@ from chimera_hpc.grid import Sweep
 from chimera_hpc.grid.parameters import DELTA, SEED, parameters_of, short
 from chimera_hpc.grid.selection import parse_selection
 from chimera_hpc.grid.tables import Slurm
+from chimera_hpc.shipped import job_file
 
 if TYPE_CHECKING:
     from chimera_hpc.store import Store
@@ -24,7 +25,12 @@ _SIZE = re.compile(r"[1-9][0-9]{0,9}([kMGT]i?)?B", re.ASCII)
 
 def add_job(parser: ArgumentParser) -> None:
     """Add the job file and what overrides it."""
-    parser.add_argument("job", type=Path, metavar="JOB.toml", help="the job file")
+    parser.add_argument(
+        "job",
+        type=job_file,
+        metavar="JOB.toml",
+        help="the job file; quickstart, paper/plane and others come with the package",
+    )
     add_overrides(parser)
 
 
@@ -134,7 +140,9 @@ def add_resubmit(parser: ArgumentParser) -> None:
 
 def add_reduction(parser: ArgumentParser) -> None:
     """Add how a run ends, and whether it may begin."""
-    parser.add_argument("--no-figures", action="store_true", help="results.json, but no figures")
+    parser.add_argument(
+        "--no-figures", action="store_true", help="results.json, but no figures and no report"
+    )
     parser.add_argument(
         "--strict",
         action="store_true",
@@ -142,8 +150,11 @@ def add_reduction(parser: ArgumentParser) -> None:
     )
 
 
-def place_of(args: Namespace, sweep: Sweep) -> Place:
-    """Return what the arguments say of where the work is done."""
+def place_of(args: Namespace, sweep: Sweep, store: Path) -> Place:
+    """Return what the arguments say of where the work is done.
+
+    SLURM is asked at once whether it would take the jobs of workers on this store.
+    """
     if args.workers is not None and args.workers < 1:
         raise BadInput(f"--workers {args.workers}: allowed is 1 or more")
     if (args.cluster == "scheduler-file") != (args.scheduler_file is not None):
@@ -156,6 +167,10 @@ def place_of(args: Namespace, sweep: Sweep) -> Place:
         raise BadInput(f"--memory {args.memory}: a size such as 800MB or 2GB is needed")
     workers = args.workers or sweep.run.workers
     wishes = slurm_wishes(args, sweep) if args.cluster in ("slurm", "allocation") else None
+    if args.cluster == "slurm" and wishes is not None:
+        from chimera_hpc.slurm.workers import check_wishes
+
+        check_wishes(wishes, store)
     return Place(args.cluster, workers, args.scheduler_file, args.memory, wishes)
 
 
@@ -174,7 +189,13 @@ def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> S
     if ":" in sweep.model:
         from chimera_hpc.models import check_user_model
 
-        check_user_model(sweep, sweep.points().row(0))
+        points = sweep.points()
+        for i in {0, len(points) - 1}:
+            check_user_model(sweep, points.row(i))
+    if sweep.reduction.show or sweep.reduction.replay:
+        from chimera_hpc.outputs.selection import check_selections
+
+        check_selections(sweep, sweep.points())
     return sweep
 
 

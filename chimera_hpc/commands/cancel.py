@@ -36,7 +36,7 @@ def execute(args: Namespace) -> int:
         raise BadInput(str(error)) from None
     for job in jobs:
         print(f"cancelled job {job.id} ({job.name}, {job.state})")
-    for folder in tls.remove_left_over(store):
+    for folder in tls.remove_left_over(store, [job.id for job in jobs]):
         print(f"removed the certificate {folder}")
     if not jobs:
         print(f"no SLURM job works on {store}")

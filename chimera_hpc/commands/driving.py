@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -13,12 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.claims import live_claims
+from chimera_hpc.commands.reporting import LiveReport
 from chimera_hpc.commands.stopping import StopRequest
 from chimera_hpc.errors import BadInput
+from chimera_hpc.files import HOPELESS
 from chimera_hpc.ledger import RESULTS, unfinished
 from chimera_hpc.processes import process_mark
 from chimera_hpc.progress import Reporter
-from chimera_hpc.provenance import differences, gather, model_source
+from chimera_hpc.provenance import differences, gather
 from chimera_hpc.slurm.walltime import NEAR, time_to_leave
 from chimera_hpc.status import Status
 
@@ -30,12 +31,12 @@ if TYPE_CHECKING:
     from chimera_hpc.work import Again, BlockReceipt, Orders, Trouble
 
 CLUSTERS = ("serial", "local", "scheduler-file", "slurm", "allocation")
+_COMPILE_THEMSELVES = ("slurm", "allocation")
+"""Where each node compiles the kernels; the driver's own machine may be of another type."""
 _CLUSTER_TRIES = 3
 """Times that a cluster may be lost before a block is done."""
 _BLOCK_TRIES = 3
 """Errors of the operating system after which a block is put aside."""
-_HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
-"""Errors that the next block would run into as well."""
 _LONGEST_WAIT = 10.0
 _RUNS_COMPARED = 20
 
@@ -77,6 +78,8 @@ class Driver:
         self._machines: list[str] = []
         self._late = False
         self._may_come: Callable[[], bool] = lambda: False
+        self.report: LiveReport | None = None
+        """Written anew while the work goes on, if given."""
 
     def work(self) -> None:
         """Do what is left of the store until nothing is left, or to stop."""
@@ -139,15 +142,16 @@ class Driver:
         from chimera_hpc.work import Orders
 
         store, say = self.store, self.reporter.say
-        info = {**gather(), **model_source(store.sweep.model)}
+        info = gather(store.sweep.model)
         for line in changes(store, info, self.strict):
             say(line)
         run = store.start_run({**info, "cluster": self.place.kind})
         kind = self.place.kind
         say(f"run {run}: {n_blocks} of {store.n_blocks} blocks to do, {kind}, in {store.path}")
-        began = time.perf_counter()
-        warm_up(store.sweep, store.points)
-        self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
+        if kind not in _COMPILE_THEMSELVES:
+            began = time.perf_counter()
+            warm_up(store.sweep, store.points)
+            self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
         self.again = self.again.of_run(run)
         return Orders(store.path, run, self.again, process_mark())
 
@@ -264,6 +268,8 @@ class Driver:
                 f"{receipt.seconds:.2f} s"
             )
             self.reporter.add(receipt.n_done, receipt.n_failed, receipt.seconds)
+        if self.report is not None:
+            self.report.refresh(self.reporter.note)
 
     def _record(self, orders: Orders) -> None:
         """Write beside the run's record where its points were computed, and until when."""
@@ -279,7 +285,7 @@ class Driver:
     def _note_trouble(self, block: int, trouble: Trouble) -> None:
         self.reporter.note(f"block {block}: {trouble.trace}")
         self._errors[block] += 1
-        if trouble.errno in _HOPELESS:
+        if trouble.errno in HOPELESS:
             self.ended_by = self.ended_by or trouble.text
         elif trouble.errno is None or self._errors[block] >= _BLOCK_TRIES:
             self.broken[block] = trouble

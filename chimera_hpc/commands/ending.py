@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chimera_hpc.commands.exits import Exit
+from chimera_hpc.commands.reporting import reduce_and_report
 from chimera_hpc.commands.stopping import StopRequest
 from chimera_hpc.status import Status
 
@@ -89,13 +90,12 @@ def _reduce(driver: Driver, folder: Path, make_figures: bool) -> list[str]:
 
     Returns what is still damaged.
     """
-    from chimera_hpc.outputs import reduce_sweep
     from chimera_hpc.store import DamagedChunk
 
     found = []
     for _ in range(_REPAIRS):
         try:
-            reduce_sweep(folder, make_figures=make_figures, say=print)
+            reduce_and_report(folder, make_figures)
         except DamagedChunk as error:
             if _shows_up(driver.store, error.damage):
                 continue

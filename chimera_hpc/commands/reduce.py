@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.commands.arguments import STORE, add_folder, store_path
 from chimera_hpc.commands.exits import Exit
+from chimera_hpc.commands.reporting import reduce_and_report
 from chimera_hpc.errors import BadInput
 from chimera_hpc.ledger import read_ledger
 from chimera_hpc.status import Status
@@ -34,11 +35,10 @@ def execute(args: Namespace) -> int:
         if left:
             print(f"{folder}: {left} points are left to compute; nothing reduced")
             return Exit.MORE_TO_DO
-    from chimera_hpc.outputs import reduce_sweep
     from chimera_hpc.store import DamagedChunk
 
     try:
-        reduce_sweep(folder, make_figures=not args.no_figures, say=print)
+        reduce_and_report(folder, make_figures=not args.no_figures)
     except DamagedChunk as error:
         raise BadInput(f"{args.folder}: {error}") from None
     except OSError as error:

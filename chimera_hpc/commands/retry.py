@@ -78,7 +78,7 @@ def execute(args: Namespace) -> int:
                 time_out=args.time_out,
                 max_steps=args.max_steps,
             )
-            place = place_of(args, store.sweep)
+            place = place_of(args, store.sweep, path)
             driver = Driver(store, place, stop, path.parent / "run.log", again, args.strict)
             driver.work()
             return end(driver, path.parent, args)

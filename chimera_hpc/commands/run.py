@@ -23,6 +23,7 @@ from chimera_hpc.commands.arguments import (
 from chimera_hpc.commands.driving import Driver
 from chimera_hpc.commands.ending import end, interrupted
 from chimera_hpc.commands.estimate import estimate, refuse_absurd
+from chimera_hpc.commands.reporting import LiveReport
 from chimera_hpc.commands.resubmitting import go_on
 from chimera_hpc.commands.stopping import stop_request
 from chimera_hpc.errors import BadInput
@@ -61,12 +62,14 @@ def execute(args: Namespace) -> int:
         try:
             sweep = load_job(args.job, args.overrides, args.block)
             folder = sweep_folder(args.out, sweep)
-            place = place_of(args, sweep)
+            place = place_of(args, sweep, folder / STORE)
             store = open_or_plan(folder, sweep, args.yes)
             from chimera_hpc.work import Again
 
             again = Again(attempts=sweep.run.attempts)
             driver = Driver(store, place, stop, folder / "run.log", again, args.strict)
+            if not args.no_figures:
+                driver.report = LiveReport(folder, store.n_points)
             driver.work()
             return go_on(end(driver, folder, args), driver, args.resubmit)
         except KeyboardInterrupt:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chimera_hpc.commands.arguments import add_out, add_resubmit, load_job, store_path, sweep_folder
+from chimera_hpc.commands.arguments import (
+    add_out,
+    add_overrides,
+    add_resubmit,
+    load_job,
+    store_path,
+    sweep_folder,
+)
 from chimera_hpc.commands.driving import Driver, Place
 from chimera_hpc.commands.exits import Exit
 from chimera_hpc.commands.resubmitting import go_on
@@ -41,6 +48,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--of", type=int, required=True, metavar="N", help="number of shares")
     parser.add_argument("--index", type=int, metavar="I", help="which share, from 0")
+    add_overrides(parser)
     add_out(parser)
     add_resubmit(parser)
 
@@ -53,7 +61,7 @@ def execute(args: Namespace) -> int:
             from chimera_hpc.store import Store
             from chimera_hpc.work import Again
 
-            path = _store_path(args.folder, args.out)
+            path = _store_path(args.folder, args.out, args.overrides)
             store = Store.open(path)
             log = path.parent / "slurm" / f"shard-{share[0]}.log"
             log.parent.mkdir(exist_ok=True)
@@ -82,11 +90,13 @@ def share_of(index: int | None, of: int) -> tuple[int, int]:
     return index, of
 
 
-def _store_path(folder: Path, out: Path | None) -> Path:
+def _store_path(folder: Path, out: Path | None, overrides: list[str]) -> Path:
     """Return the store of a folder, or of a job file, which is planned by the first who comes."""
     if not folder.is_file():
+        if overrides:
+            raise BadInput(f"--set: {folder} is planned already; it goes with a job file only")
         return store_path(folder.absolute())
-    sweep = load_job(folder, [])
+    sweep = load_job(folder, overrides)
     place = sweep_folder(out, sweep)
     try:
         return open_or_plan(place, sweep, yes=False).path

@@ -24,8 +24,8 @@ from chimera_hpc.errors import BadInput
 from chimera_hpc.files import write_atomically
 from chimera_hpc.grid.tables import Slurm
 from chimera_hpc.slurm import queue
-from chimera_hpc.slurm.queue import SlurmFailed
-from chimera_hpc.slurm.script import ARRAY, LOGS, MODES, SCRIPTS, Target, job_name
+from chimera_hpc.slurm.queue import SlurmFailed, limit_seconds
+from chimera_hpc.slurm.script import ARRAY, LOGS, MODES, SCRIPTS, TIME, Target, job_name
 
 if TYPE_CHECKING:
     from chimera_hpc.grid import Sweep
@@ -54,6 +54,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--mode", choices=MODES, default="array", help="which way (default: array)")
     parser.add_argument("--workers", type=int, metavar="N", help="worker processes in all")
     parser.add_argument("--array", type=int, metavar="N", help="elements of the job array")
+    parser.add_argument("--at-once", type=int, metavar="N", help="of which run at a time, at most")
     add_slurm(parser)
     add_resubmit(parser)
     parser.add_argument(
@@ -67,6 +68,7 @@ def execute(args: Namespace) -> int:
     """Print or submit."""
     sweep = load_job(args.job, args.overrides, args.block)
     wishes = slurm_wishes(args, sweep)
+    _check_times(args, wishes)
     target = _target(args, sweep)
     if not args.submit:
         print(SCRIPTS[args.mode](target, wishes), end="")
@@ -77,17 +79,29 @@ def execute(args: Namespace) -> int:
         raise BadInput(str(error)) from None
 
 
+def _check_times(args: Namespace, wishes: Slurm) -> None:
+    if args.resubmit < 0:
+        raise BadInput(f"--resubmit {args.resubmit}: allowed is 0 or more")
+    limit = limit_seconds(wishes.time or TIME)
+    # A job that is over before it begins would be put back into the queue for nothing.
+    if args.drain is not None and not 0 <= args.drain < limit:
+        raise BadInput(f"--drain {args.drain:g}: allowed is 0 up to the time limit, {limit:g} s")
+
+
 def _target(args: Namespace, sweep: Sweep) -> Target:
     folder = sweep_folder(args.out, sweep)
     overrides = [*args.overrides, *([f"run.block={args.block}"] if args.block else [])]
+    planned = args.submit or (folder / LOGS).is_dir()
     return Target(
         job=args.job.absolute(),
         folder=folder,
         name=job_name(folder / STORE, args.mode),
-        logs=folder / LOGS,
+        # SLURM makes no folders: a job whose log has no place fails without a word.
+        logs=folder / LOGS if planned else None,
         resubmit=args.resubmit,
         drain=args.drain,
         overrides=tuple(overrides),
+        planned=planned,
     )
 
 
@@ -96,12 +110,15 @@ def _submit_all(args: Namespace, sweep: Sweep, target: Target, wishes: Slurm) ->
     store = open_or_plan(target.folder, sweep, args.yes)
     if args.mode == "array":
         wishes = _fitting(wishes, store.n_blocks)
-    job = _submit(target, args.mode, wishes)
+    first = job = _submit(target, args.mode, wishes)
     print(f"submitted job {job} ({args.mode}); logs in {target.logs}")
     if args.mode == "array" and not args.no_reduce:
         last = replace(target, name=job_name(store.path, "reduce"))
         job = _submit(last, "reduce", wishes, f"--dependency=afterany:{job}")
         print(f"submitted job {job} (reduce)")
+    reason = queue.waits_for(first, target.name)
+    if reason is not None:
+        print(f"job {first} waits: {reason}")
     return Exit.COMPLETE
 
 

@@ -27,9 +27,10 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep verify results/quickstart --sample 0.01
 
 --stored decodes every chunk and computes every digest anew from the stored bytes; --sample computes
-this share of the points anew, at least one, and compares digests. Without either: both, with a
-sample of 0.01. Exit status 1: something is not as it was written, or comes out otherwise (listed,
-with what differs in code, libraries or processor). --forget has `run` compute damaged blocks anew.
+this share of the points anew, at least one, compares digests, and says what differs in code,
+libraries or processor between the runs that made these points and now. Without either: both, with a
+sample of 0.01. Exit status 1: something is not as it was written, or comes out otherwise. --forget
+has `run` compute damaged blocks anew.
 """
 _SAMPLE = 0.01
 
@@ -81,15 +82,16 @@ def _verify_stored(store: Store, forget: bool) -> bool:
 
 
 def _forget(store: Store, damage: list[Damage]) -> None:
-    blocks = sorted({d.block for d in damage})
-    for block in blocks:
+    forgotten = 0
+    for block in sorted({d.block for d in damage}):
         claim = claim_block(store.path, block, run=0)
         if claim is None:
             print(f"  block {block} is in work: left as it is")
             continue
         store.discard_block(block)
         claim.release()
-    print(f"  {len(blocks)} blocks forgotten; run computes them anew")
+        forgotten += 1
+    print(f"  {forgotten} blocks forgotten; run computes them anew")
 
 
 def _verify_sample(store: Store, share: float, seed: int) -> bool:
@@ -102,10 +104,9 @@ def _verify_sample(store: Store, share: float, seed: int) -> bool:
     print(f"sample: {count} of {len(results)} points computed anew, {len(different)} different")
     for i, size in different[:MOST_LINES]:
         print(f"  {name_of(store, i)}: largest difference of a feature or scalar {size:.3g}")
-    if different:
-        runs = sorted({int(ledger["run"][i]) for i, _ in different})
-        for line in _what_differs(store, runs):
-            print(f"  {line}")
+    wrong = [i for i, _ in different]
+    for line in _what_differs(store, ledger["run"][wrong or chosen], bool(different)):
+        print(f"  {line}")
     return not different
 
 
@@ -138,17 +139,22 @@ def _different(
     return different
 
 
-def _what_differs(store: Store, runs: list[int]) -> list[str]:
+def _what_differs(store: Store, runs: NDArray[np.int64], wanted: bool) -> list[str]:
+    """Return what differs between these runs and now; if it is `wanted`, a line where nothing does.
+
+    It is said of points that came out the same, too.
+    """
     from chimera_hpc.provenance import differences, gather
     from chimera_hpc.store.runs import read_run
 
-    lines: dict[str, None] = {}
-    now = gather()
-    for run in runs:
+    lines = []
+    now = gather(store.sweep.model)
+    for run in np.unique(runs).tolist():
         try:
             found = differences(read_run(store.path, run), now)
         except BadInput as error:
             found = [str(error)]
-        nothing = ["nothing known of differs: a fault of the machine?"]
-        lines |= dict.fromkeys(f"run {run}: {line}" for line in found or nothing)
-    return list(lines)
+        if wanted and not found:
+            found = ["nothing known of differs: a fault of the machine?"]
+        lines += [f"run {run}: {line}" for line in found]
+    return lines

@@ -69,6 +69,7 @@ def _explain(store: Store, i: int) -> None:
 
 
 def _provenance(store: Store, run: int) -> list[str]:
+    from chimera_hpc.provenance import differences, gather
     from chimera_hpc.store.runs import read_run, read_work
 
     try:
@@ -84,7 +85,8 @@ def _provenance(store: Store, run: int) -> list[str]:
     machine = _table(info, "machine")
     names = read_work(store.path, run).get("machines")
     names = names if isinstance(names, list) else [f"{machine.get('host')}: {machine.get('cpu')}"]
-    return [*lines, *(f"on {name}" for name in names)]
+    lines += [f"on {name}" for name in names]
+    return lines + [f"since then: {line}" for line in differences(info, gather(store.sweep.model))]
 
 
 def _table(info: Mapping[str, Any], key: str) -> Mapping[str, Any]:

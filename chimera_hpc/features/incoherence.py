@@ -143,7 +143,7 @@ def discontinuity_measure(local: ArrayLike, delta: Array) -> Array: ...
 
 
 def discontinuity_measure(local: ArrayLike, delta: float | Array) -> float | Array:
-    """Number of incoherent stretches, eta = sum_m |s_m - s_{m+1}| / 2 around the ring.
+    """Number of incoherent stretches: ``eta = sum_m |s_m - s_{m+1}| / 2`` around the ring.
 
     1 for a chimera, 2 and more for a multi-chimera, 0 for a coherent and for an incoherent state
     (all s_m equal). Parameters, result and errors as `strength_of_incoherence`.

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cache
-from importlib import import_module
+from importlib import import_module, invalidate_caches
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -127,8 +130,9 @@ def user_model(name: str) -> Any:
     """Return the object that ``package.module:object`` names.
 
     It has ``parameters``, a `ModelParameters`, and ``build(sweep, row)``, which returns what
-    `chimera_hpc.models.Model` lists for the point with this row of columns. The module is imported
-    from the Python path (``PYTHONPATH=FOLDER``), by the workers too.
+    `chimera_hpc.models.Model` lists for the point with this row of columns: see
+    `chimera_hpc.models.user.OwnModel`, which makes both. The module is imported from the Python
+    path, and after that from the folders of `look_in`, by the workers too.
 
     Raises
     ------
@@ -140,16 +144,54 @@ def user_model(name: str) -> Any:
     if not (_MODULE.fullmatch(module) and attribute.isidentifier()):
         raise BadInput(f"{where} is not of the form package.module:object")
     try:
-        found = getattr(import_module(module), attribute)
+        found = getattr(_import(module), attribute)
     except Exception as error:
         # Whatever the user's module does when it is imported.
         text = " ".join(f"{type(error).__name__}: {error}".split())
+        if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
+            text += "; it must be in the job's folder, the current one, or on PYTHONPATH"
         raise BadInput(f"{where} can't be imported: {text}") from None
     if not isinstance(getattr(found, "parameters", None), ModelParameters):
         raise BadInput(f"{where} has no attribute parameters of type ModelParameters")
     if not callable(getattr(found, "build", None)):
         raise BadInput(f"{where} has no method build(sweep, row)")
     return found
+
+
+def _import(module: str) -> ModuleType:
+    """Import a module without leaving its bytecode on the disk.
+
+    Python tells stale bytecode by the second of the last change and the size of the source: an edit
+    may escape it.
+    """
+    before = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
+    try:
+        invalidate_caches()
+        return import_module(module)
+    finally:
+        sys.dont_write_bytecode = before
+
+
+def look_in(folder: str | Path) -> None:
+    """Have the modules of users' models looked for in this folder too, after all other places."""
+    place = str(Path(folder).absolute())
+    if place not in sys.path:
+        sys.path.append(place)
+
+
+def model_folder(model: str) -> str | None:
+    """Return the folder in which the module of a user's model was found; None for other models."""
+    if ":" not in model:
+        return None
+    user_model(model)
+    module = model.partition(":")[0]
+    file = getattr(sys.modules[module], "__file__", None)
+    if file is None:
+        return None
+    place = Path(file).absolute()
+    levels = module.count(".") + (place.name == "__init__.py")
+    return str(place.parents[levels])
 
 
 SEED = Parameter("seed", int, None, "Number of the random initial state.", low=0, high=2**63 - 1)

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from chimera_hpc.errors import BadInput
-from chimera_hpc.grid.parameters import DELTA, MODELS, SEED, Parameter, nearest, short
+from chimera_hpc.grid.parameters import (
+    DELTA,
+    MODELS,
+    SEED,
+    ModelParameters,
+    Parameter,
+    nearest,
+    short,
+)
 
 FIGURES = ("space_time", "indicators", "whole_run")
 """Names of the figures of a sweep, drawn by `chimera_hpc.figures`."""
@@ -53,12 +61,12 @@ _NUMBERED = re.compile(r"([a-z_]+)_([1-9][0-9]{0,8})")
 
 
 def parse_selection(
-    text: str, key: str = "selection", known: Mapping[str, Parameter] = _PARAMETERS
+    text: str, key: str = "selection", known: Mapping[str, Parameter] | None = None
 ) -> dict[str, int | float]:
     """Return the values by name of a text such as ``P=9 Q=9 seed=0``.
 
-    `key` begins the message of the BadInput for anything else: words that are not NAME=NUMBER,
-    names that no model has, values that the parameter does not take, a name twice.
+    `key` begins the message of the BadInput for anything else: words that are not NAME=NUMBER, a
+    name twice, and where it is said what is `known`, other names and values.
     """
     where = f"{key}: {short(text)}"
     values: dict[str, int | float] = {}
@@ -66,18 +74,31 @@ def parse_selection(
         name, _, number = word.partition("=")
         if not _WORD.fullmatch(word):
             raise BadInput(f"{where}: {_EXAMPLE}")
-        if name not in known:
+        if known is not None and name not in known:
             raise BadInput(f"{where}: unknown {short(name)}{nearest(name, list(known))}")
         if name in values:
             raise BadInput(f"{where}: {name} is given twice")
         try:
             value = int(number) if _INTEGER.fullmatch(number) else float(number)
-            values[name] = known[name].check(value)
+            values[name] = value if known is None else known[name].check(value)
         except ValueError as error:
             raise BadInput(f"{where}: {name}: {error}") from None
     if not values:
         raise BadInput(f"{where}: {_EXAMPLE}")
     return values
+
+
+def check_names(key: str, texts: Sequence[str], model: ModelParameters | None) -> None:
+    """Raise BadInput for a selection with a name or value that the model does not know.
+
+    Without a model: that none of the project's own models knows; a selection may speak of another
+    sweep.
+    """
+    known = _PARAMETERS
+    if model is not None:
+        known = {p.name: p for p in (*model.parameters, DELTA, SEED)}
+    for text in texts:
+        parse_selection(text, key, known)
 
 
 def split_figure_name(name: str) -> tuple[str, int | None]:
@@ -87,7 +108,10 @@ def split_figure_name(name: str) -> tuple[str, int | None]:
 
 
 def check_selections(key: str) -> Callable[[Any], Any]:
-    """Return what turns a list of selections into a tuple of texts, or raises BadInput."""
+    """Return what turns a list of selections into a tuple of texts, or raises BadInput.
+
+    Names are checked by `check_names`, which knows the model.
+    """
 
     def check(value: Any) -> tuple[str, ...]:
         texts = _texts(value)

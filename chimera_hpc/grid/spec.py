@@ -29,9 +29,18 @@ from chimera_hpc.grid.checks import (
     normal_grid,
     parse_seeds,
 )
-from chimera_hpc.grid.parameters import DELTA, SEED, fixed_schema, grid_schema, parameters_of, short
+from chimera_hpc.grid.parameters import (
+    DELTA,
+    SEED,
+    fixed_schema,
+    grid_schema,
+    look_in,
+    parameters_of,
+    short,
+)
 from chimera_hpc.grid.points import DTYPES, Points, expand
 from chimera_hpc.grid.reading import apply_overrides, bad, one_line, parse_toml, read_text
+from chimera_hpc.grid.selection import check_names
 from chimera_hpc.grid.tables import Features, Integrator, Keep, Line, Reduction, Run, Slurm, Table
 
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
@@ -73,15 +82,28 @@ class Sweep(Table):
 
     @classmethod
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Self:
-        """Return the sweep of a job file, with KEY=VALUE overrides (`reading.apply_overrides`)."""
-        return cls.from_toml_text(read_text(path), overrides, where=str(path))
+        """Return the sweep of a job file, with KEY=VALUE overrides (`reading.apply_overrides`).
+
+        The module of a user's model may lie beside the job file.
+        """
+        folder = Path(path).parent
+        return cls.from_toml_text(read_text(path), overrides, where=str(path), folder=folder)
 
     @classmethod
     def from_toml_text(
-        cls, text: str, overrides: Sequence[str] = (), where: str = "job file"
+        cls,
+        text: str,
+        overrides: Sequence[str] = (),
+        where: str = "job file",
+        folder: Path | None = None,
     ) -> Self:
-        """Return the sweep that TOML text describes; `where` begins the messages of errors."""
+        """Return the sweep that TOML text describes; `where` begins the messages of errors.
+
+        The module of a user's model is looked for in `folder` too.
+        """
         data = apply_overrides(parse_toml(text, where), overrides)
+        if folder is not None and ":" in str(data.get("model", "")):
+            look_in(folder)
         settings = "".join(f" --set {short(override)}" for override in overrides)
         return cls.from_dict(data, where=f"{where} with{settings}" if settings else where)
 
@@ -183,6 +205,9 @@ class Sweep(Table):
         single = {name: Values((value,)) for name, value in self.fixed.items()}
         check_tables(self.integrator, self.features, model, {**single, **axes})
         check_nodes(self.features, self.n_nodes)
+        own = model if ":" in self.model else None
+        check_names("reduction.show", self.reduction.show, own)
+        check_names("reduction.replay", self.reduction.replay, own)
         return self
 
 

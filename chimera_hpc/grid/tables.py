@@ -115,7 +115,7 @@ class Features(Table):
         950.0, ge=0, description="Begin of the analysis; it ends at integrator.t_end."
     )
     n_peaks: int = Field(
-        10, ge=2, le=10**6, description="Maxima of one window, both ends included."
+        10, ge=3, le=10**6, description="Maxima of one window, both ends included."
     )
     n_share: int = Field(5, ge=0, description="Maxima that consecutive windows share.")
     clock: Literal["ring", "own"] = Field(
@@ -247,6 +247,9 @@ class Slurm(Table):
     )
     workers: Count | None = Field(None, description="Worker processes in all.")
     array: Count | None = Field(None, description="Elements of the job array.")
+    at_once: Count | None = Field(
+        None, description="Elements of the job array that run at a time, at most."
+    )
     setup: Lines = Field((), description="Shell lines before the work: modules, environments.")
     extra: Lines = Field((), description="Further options of sbatch, one a line.")
     interface: Word | None = Field(None, description="Network interface of scheduler and workers.")

@@ -103,3 +103,12 @@ def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
             _numba.config.CACHE_DIR = before
 
     return decorate
+
+
+def compile_anew(signature: Any, function: Callable[..., Any]) -> Any:
+    """Compile a user's function as `jit` does, but keep nothing of it on disk.
+
+    Its source, and what it calls, may be edited between two processes at any time.
+    """
+    options = {"nogil": True, "error_model": "numpy", "_nrt": False}
+    return _numba.njit(signature, **options)(function)

@@ -2,7 +2,7 @@
 
 For developers: a model is one small file with a frozen dataclass that has what `Model` lists, one
 line in `_BUILDERS`, and its table of parameters in `grid.parameters`. A user's own model needs no
-line anywhere, see `grid.parameters.user_model`; `check_user_model` tells what is wrong with one.
+line anywhere, see `models.user`; `check_user_model` tells what is wrong with one.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, Protocol
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,11 +18,14 @@ from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Sweep
 from chimera_hpc.grid.parameters import short, user_model
 from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
+from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
+from chimera_hpc.models.user import OwnPoint
 from chimera_hpc.streams import initial_stream, topology_stream
 from chimera_hpc.topology import Topology
 
+_config: Any = numba.config  # its attributes are made at run time
 Array = NDArray[np.float64]
 Row = Mapping[str, int | float]
 
@@ -106,35 +110,65 @@ def check_user_model(sweep: Sweep, row: Row) -> None:
     where = f"model: {short(sweep.model)}"
     try:
         model = build(sweep, row)
-        u, v = initial_state(sweep, row, model)
-        state = np.asarray(model.state(u, v))
-        _expect(where, "state(u, v)", state.shape, (model.n_rows,))
-        _expect(where, "n_nodes", model.n_nodes, sweep.n_nodes)
-        hash(model.lane_group)
-        signal, second = model.node_pair(state[:, None])
-        _expect(where, "node_pair(rows)[0]", signal.shape, (model.n_nodes, 1))
-        _expect(where, "node_pair(rows)[1]", second.shape, (model.n_nodes, 1))
-        second = model.second_variable(state[:, None], v, np.zeros(1))
-        _expect(where, "second_variable(rows, v0, t)", second.shape, (1, model.n_second))
-        column = np.asarray(model.lane_params, dtype=np.float64)[:, None].copy()
-        rows, slope = state[:, None].copy(), np.zeros((model.n_rows, 1))
-        signatures = getattr(model.right_hand_side, "nopython_signatures", [])
-        if RIGHT_HAND_SIDE not in signatures:
-            raise BadInput(f"{where}: right_hand_side is not compiled as {RIGHT_HAND_SIDE}")
-        model.right_hand_side(rows, slope, column, np.asarray(model.int_params, dtype=np.int64))
-    except BadInput:
-        raise
+        _check_shapes(sweep, row, model)
+        _check_right_hand_side(model, model.state(*initial_state(sweep, row, model)))
+    except BadInput as error:
+        raise BadInput(f"{where}: {error}") from None
     except Exception as error:
         # Whatever the user's code does.
         text = " ".join(f"{type(error).__name__}: {error}".split())
         raise BadInput(f"{where} does not work: {text}") from None
-    if not np.isfinite(slope).all():
-        raise BadInput(f"{where}: the right-hand side is not finite in the initial state")
 
 
-def _expect(where: str, what: str, found: Any, wanted: Any) -> None:
+def _check_shapes(sweep: Sweep, row: Row, model: Model) -> None:
+    u, v = initial_state(sweep, row, model)
+    state = np.asarray(model.state(u, v))
+    _expect("state(u, v)", state.shape, (model.n_rows,))
+    _expect("n_nodes", model.n_nodes, sweep.n_nodes)
+    hash(model.lane_group)
+    if not np.isfinite(state).all():
+        raise BadInput("the initial state is not finite")
+    for i, signal in enumerate(model.node_pair(state[:, None])):
+        _expect(f"node_pair(rows)[{i}]", signal.shape, (model.n_nodes, 1))
+    second = model.second_variable(state[:, None], v, np.zeros(1))
+    _expect("second_variable(rows, v0, t)", second.shape, (1, model.n_second))
+
+
+def _check_right_hand_side(model: Model, state: Array) -> None:
+    """Try it on one lane and on a pack of different ones: each must have the numbers it has alone.
+
+    A lane that reads another's parameters, or vector functions that round otherwise than those for
+    single numbers, would make results depend on the neighbours.
+    """
+    rhs, ints = model.right_hand_side, np.asarray(model.int_params, dtype=np.int64)
+    if not (_config.DISABLE_JIT or RIGHT_HAND_SIDE in getattr(rhs, "nopython_signatures", [])):
+        raise BadInput(f"right_hand_side is not compiled as {RIGHT_HAND_SIDE}")
+    scale = 1.0 + 1e-3 * np.arange(LANES)
+    rows = np.asarray(state, dtype=np.float64)[:, None] * scale
+    params = np.asarray(model.lane_params, dtype=np.float64)[:, None] * scale
+    together = np.full_like(rows, np.nan)
+    before = rows.copy()
+    rhs(rows, together, params, ints)
+    if rows.tobytes() != before.tobytes():
+        raise BadInput("the right-hand side changes the state y")
+    for lane in range(LANES):
+        alone = np.full((len(rows), 1), np.nan)
+        rhs(rows[:, [lane]].copy(), alone, params[:, [lane]].copy(), ints)
+        if lane == 0 and not np.isfinite(alone).all():
+            row = int(np.flatnonzero(~np.isfinite(alone[:, 0]))[0])
+            raise BadInput(
+                f"the right-hand side is not finite in the initial state, or not set, in row {row}"
+            )
+        if alone[:, 0].tobytes() != together[:, lane].tobytes():
+            raise BadInput(
+                "the right-hand side gives a run other numbers beside others than alone: "
+                "lane by lane, only its own columns of y, dy and p may be used"
+            )
+
+
+def _expect(what: str, found: Any, wanted: Any) -> None:
     if found != wanted:
-        raise BadInput(f"{where}: {what} is {found} where {wanted} is needed")
+        raise BadInput(f"{what} is {found} where {wanted} is needed")
 
 
 def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:
@@ -142,7 +176,8 @@ def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:
 
     Uniform in the ball of radius ``delta`` around ``integrator.centre``: in the maximum norm every
     variable is ``centre + delta * U[-1, 1]``, u first, then v (paper sec. Method and results). In
-    the Euclidean norm the direction is Gaussian and the radius ``delta * U**(1/n)``.
+    the Euclidean norm the direction is Gaussian and the radius ``delta * U**(1/n)``. A user's model
+    may draw it otherwise, from the same stream.
 
     Returns
     -------
@@ -150,6 +185,9 @@ def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:
     v : shape (n_second,)
     """
     stream = initial_stream(*stream_key(sweep, row))
+    drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
+    if drawn is not None:
+        return drawn
     size = model.n_nodes + model.n_second
     if sweep.integrator.ball == "maximum":
         offset = stream.uniform(-1.0, 1.0, size)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -15,12 +16,28 @@ from typing import Any
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.files import write_atomically
+from chimera_hpc.paper.audit_text import audit_text
 from chimera_hpc.paper.claims import markdown, read_claims, scoreboard, summary
 from chimera_hpc.paper.evidence import Evidence
 from chimera_hpc.paper.plan import JOBS, QUICK
+from chimera_hpc.shipped import jobs_folder
 
-_ROOT = Path(__file__).resolve().parents[2]
 _ATLASES = ("diagonal", "orientation2")
+
+_HEAD = """\
+# Claims of the paper
+
+`scripts/reproduce` runs the jobs in `jobs/paper/`, judges the claims of `jobs/paper/claims.toml`
+by the functions in `chimera_hpc/paper/rules.py`, and writes this table (claims.md), results.json
+and the figures; `--quick` thins the grids, `--only JOB,...` runs some jobs, `--only none` judges
+what there is. Rules were fixed before the jobs were run; none was changed to suit a result, but for
+one that had counted slow motion without an oscillation as an oscillation (sec. moredetdyn), which
+now has a claim of its own. Fractions have Wilson 95 % intervals.
+"""
+_TRIED = "tried.md"
+"""Beside the claims: what was tried of those that do not reproduce."""
+
+_KEPT = ("audit", "seconds", "cost")
 
 Say = Callable[[str], None]
 
@@ -41,17 +58,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     audit: dict[str, Any] = {}
     if not args.no_audit and not failed and names:
         from chimera_hpc.paper.audit import audit_jobs
+        from chimera_hpc.paper.audit_figures import draw_audit
 
         audit = audit_jobs(folder, names, args.share, args.workers, print)
+        draw_audit(folder, audit)
     rows = scoreboard(read_claims(args.jobs / "claims.toml"), Evidence(folder))
-    seconds = time.monotonic() - began
-    write_scoreboard(folder, rows, audit, {n: t for n, (_, t) in times.items()}, args.quick)
+    spent = cost(time.monotonic() - began)
+    tried = args.jobs / _TRIED
+    made = {
+        "schema": 1,
+        "quick": args.quick,
+        "claims": rows,
+        "audit": audit,
+        "seconds": {name: seconds for name, (_, seconds) in times.items()},
+        "cost": spent | {"jobs": len(names)} if names else {},
+    }
+    write_scoreboard(folder, made, tried.read_text() if tried.is_file() else "")
     print(summary(rows))
     for row in rows:
         if row["reproduced"] is False:
             print(f"  not reproduced: {row['id']}: {row['measured']}")
     print(f"scoreboard  {folder / 'claims.md'}, {folder / 'results.json'}")
-    print(f"{seconds / 60:.1f} minutes")
+    print(f"{spent['minutes']:.1f} minutes, {spent['cpu_minutes']:.1f} of processor time")
     for name in failed:
         print(f"failed: {name}, exit status {times[name][0]}; see {folder / name}.log")
     return 1 if failed else 0
@@ -71,7 +99,8 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--share", type=float, default=0.02, help="share of the points that the audit runs again"
     )
     parser.add_argument("--no-audit", action="store_true", help="leave the audit out")
-    parser.add_argument("--jobs", type=Path, default=_ROOT / "jobs/paper", help=argparse.SUPPRESS)
+    jobs = jobs_folder() / "paper"
+    parser.add_argument("--jobs", type=Path, default=jobs, help=argparse.SUPPRESS)
     return parser.parse_args(arguments)
 
 
@@ -112,7 +141,7 @@ def _run(
     began = time.monotonic()
     place = ["--cluster", "serial"] if quick else ["--workers", str(workers)]
     settings = [word for text in (QUICK.get(name, ()) if quick else ()) for word in ("--set", text)]
-    job = _ROOT / "jobs/paper" / f"{name}.toml"
+    job = jobs_folder() / "paper" / f"{name}.toml"
     command = [sys.executable, "-P", "-m", "chimera_hpc.sweep", "run", str(job)]
     with (folder / f"{name}.log").open("w") as log:
         ended = subprocess.run(
@@ -126,29 +155,47 @@ def _run(
     return name, (ended.returncode, seconds)
 
 
-def write_scoreboard(
-    folder: Path,
-    rows: Sequence[dict[str, Any]],
-    audit: dict[str, Any],
-    seconds: dict[str, float],
-    quick: bool,
-) -> None:
-    """Write results.json and claims.md of the whole reproduction."""
+def cost(seconds: float) -> dict[str, float]:
+    """Return what this call has used so far: wall and processor time, and how busy the machine is.
+
+    Processor time is that of this process and of those it has waited for.
+    """
+    used = [resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return {
+        "minutes": seconds / 60.0,
+        "cpu_minutes": sum(one.ru_utime + one.ru_stime for one in used) / 60.0,
+        "processors": os.cpu_count() or 1,
+        "load": os.getloadavg()[2],
+    }
+
+
+def write_scoreboard(folder: Path, made: dict[str, Any], notes: str = "") -> None:
+    """Write results.json and claims.md of the whole reproduction; `notes` are its last section."""
     from chimera_hpc.reduce.results import to_json
 
-    if not audit:  # a later call that only judges keeps the audit there is
-        try:
-            audit = json.loads((folder / "results.json").read_text())["audit"]
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            audit = {}
-    results = {"schema": 1, "quick": quick, "claims": rows, "audit": audit, "seconds": seconds}
-    write_atomically(folder / "results.json", to_json(results).encode())
-    text = f"# Claims of the paper\n\n{summary(rows)}.\n\n{markdown(rows)}"
-    if audit:
-        from chimera_hpc.paper.audit import audit_table
-
-        text += f"\n## Audit of the labels\n\n{audit_table(audit)}"
+    # A call that only judges, or runs some jobs, keeps what is known of the others.
+    try:
+        known = json.loads((folder / "results.json").read_text())
+        made = made | {key: known.get(key, {}) | made[key] for key in _KEPT}
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
+        pass
+    write_atomically(folder / "results.json", to_json(made).encode())
+    parts = [_HEAD, f"{summary(made['claims'])}.\n", *_cost_line(made["cost"])]
+    parts.append(markdown(made["claims"]))
+    if made["audit"]:
+        parts.append(f"## Audit of the labels\n\n{audit_text(made['audit'])}")
+    text = "\n".join([*parts, notes] if notes else parts)
     write_atomically(folder / "claims.md", text.encode())
+
+
+def _cost_line(spent: dict[str, float]) -> list[str]:
+    if not spent:
+        return []
+    return [
+        f"The last call that ran jobs ran {spent['jobs']} in {spent['minutes']:.0f} minutes of "
+        f"wall time and {spent['cpu_minutes']:.0f} of processor time, on {spent['processors']} "
+        f"processors that {spent['load']:.1f} processes wanted at the end (mean of 15 minutes).\n"
+    ]
 
 
 if __name__ == "__main__":

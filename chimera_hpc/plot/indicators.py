@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from chimera_hpc.features import FEATURES
 from chimera_hpc.plot import style
 
 
@@ -23,6 +24,12 @@ class Profiles:
     phase_std: ArrayLike
     amplitude_std: ArrayLike
     frequency_std: ArrayLike
+
+
+def profiles_of(features: ArrayLike) -> Profiles:
+    """Return the profiles in an array of features (8, N), rows as in `features.FEATURES`."""
+    rows = dict(zip(FEATURES, np.asarray(features, dtype=np.float64), strict=True))
+    return Profiles(**{field.name: rows[field.name] for field in fields(Profiles)})
 
 
 _ROWS = (

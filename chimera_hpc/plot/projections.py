@@ -18,6 +18,8 @@ from chimera_hpc.plot import style
 
 LABELS = (r"$V_\theta$", r"$V_a$", r"$V_\Omega$ (1/time)")
 PLANES = ((0, 1), (0, 2), (1, 2))
+_MANY = 500
+"""Points beyond which a PDF holds dots instead of a path for each."""
 
 
 @style.styled
@@ -58,7 +60,7 @@ def draw_projection(
             marker=style.marker_of(name),
             linewidths=0.0,
             label=style.spoken(name),
-            rasterized=len(chosen) > 5000,
+            rasterized=len(chosen) > _MANY,
             **kwargs,
         )
     axes.set_xlabel(LABELS[x])
@@ -79,6 +81,7 @@ def _draw_solid(
             marker=style.marker_of(name),
             color=style.colour_of(name),
             linewidths=0.0,
+            rasterized=len(x) > _MANY,
         )
     axes.set_xlabel(LABELS[0], labelpad=-4.0)
     axes.set_ylabel(LABELS[1], labelpad=-4.0)

@@ -22,15 +22,16 @@ def space_time(
     titles: Sequence[str] = (),
     *,
     columns: int = 3,
-    zoom: float | None = None,
+    zoom: float | Sequence[float] | None = None,
     symbol: str = "u_i(t)",
 ) -> Figure:
     """Draw one panel for each (t, u): t (T,) uniform, u (T, N); one colour scale for all.
 
-    `zoom` adds below each panel its last `zoom` time units: fast oscillations blur in print when
-    the window holds more periods than the panel has dots.
+    `zoom` adds below each panel its last `zoom` time units, the same for all or one for each: fast
+    oscillations blur in print when the window holds more periods than the panel has dots.
     """
-    columns = min(columns, len(panels))
+    columns = 2 if len(panels) == 4 and columns > 2 else min(columns, len(panels))
+    closer = [zoom] * len(panels) if zoom is None or isinstance(zoom, int | float) else list(zoom)
     rows = -(-len(panels) // columns)
     parts = 1 if zoom is None else 2
     width = style.PAGE if columns > 1 else style.COLUMN + 0.6
@@ -41,8 +42,8 @@ def space_time(
         row, column = parts * (i // columns), i % columns
         image = draw_space_time(axes[row, column], *panel, largest)
         axes[row, column].set_title(titles[i] if i < len(titles) else "")
-        if zoom is not None:
-            draw_space_time(axes[row + 1, column], *last_part(*panel, zoom), largest)
+        if (duration := closer[i]) is not None:
+            draw_space_time(axes[row + 1, column], *last_part(*panel, duration), largest)
     for empty in (
         axes.reshape(rows, parts, columns).swapaxes(1, 2).reshape(-1, parts)[len(panels) :]
     ):

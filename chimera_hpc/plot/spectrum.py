@@ -26,14 +26,30 @@ class Spectrum:
     """(K,)"""
     peak: int
     """Index of the largest amplitude, with a neighbour to each side."""
+    fit: ArrayLike | None = None
+    """(T,) The line that was fitted to the signal."""
+
+    @property
+    def has_parabola(self) -> bool:
+        """Whether a parabola is put through the peak: not at the edges of the spectrum.
+
+        Bin 1 has the mean, which was taken away, for its lower neighbour.
+        """
+        return 1 < self.peak < len(np.asarray(self.frequency)) - 1
 
 
 @style.styled
-def spectrum(data: Spectrum) -> Figure:
-    """Draw (a) signal, (b) spectrum and parabola, (c) both maxima from near."""
+def spectrum(data: Spectrum, title: str = "") -> Figure:
+    """Draw (a) signal and fit, (b) spectrum and parabola, (c) both maxima from near."""
     figure = style.new_figure(style.PAGE + 0.4, 2.5)
     axes = list(figure.subplots(1, 3))
-    axes[0].plot(data.t, data.y, color=style.BLUE)
+    axes[0].plot(data.t, data.y, color=style.BLUE, label="signal")
+    if data.fit is not None:
+        axes[0].plot(data.t, data.fit, "--", color=style.RED, label="fit")
+        low, high = axes[0].get_ylim()
+        axes[0].set_ylim(low - 0.18 * (high - low), high)
+        axes[0].legend(loc="lower left", fontsize=6.5, ncols=2)
+    axes[0].set_title(title)
     axes[0].set_xlabel("time $t$")
     axes[0].set_ylabel("$y(t)$")
     _draw_spectrum(axes[1], data, reach=8.0)
@@ -64,10 +80,11 @@ def _draw_spectrum(axes: Axes, data: Spectrum, reach: float) -> None:
     frequency, amplitude = np.asarray(data.frequency, float), np.asarray(data.amplitude, float)
     step = float(frequency[1] - frequency[0])
     centre = float(frequency[data.peak])
-    offset = np.linspace(-1.1 * step, 1.1 * step, 201)
     axes.plot(frequency, amplitude, "--o", color=style.BLUE, markersize=2.5, label="FFT")
-    height = np.polyval(parabola(data), offset)
-    axes.plot(centre + offset, height, color=style.RED, label="parabola")
+    if data.has_parabola:
+        offset = np.linspace(-1.1 * step, 1.1 * step, 201)
+        height = np.polyval(parabola(data), offset)
+        axes.plot(centre + offset, height, color=style.RED, label="parabola")
     axes.set_xlim(max(centre - 1.1 * reach * step, 0.0), centre + 1.1 * reach * step)
     axes.set_ylim(0.0, None)
     axes.set_xlabel("frequency (1/time)")
@@ -77,7 +94,6 @@ def _draw_spectrum(axes: Axes, data: Spectrum, reach: float) -> None:
 def _draw_maxima(axes: Axes, data: Spectrum) -> None:
     frequency = float(np.asarray(data.frequency, float)[data.peak])
     amplitude = float(np.asarray(data.amplitude, float)[data.peak])
-    top = vertex(data)
     axes.plot(
         frequency,
         amplitude,
@@ -86,6 +102,10 @@ def _draw_maxima(axes: Axes, data: Spectrum) -> None:
         markersize=6.0,
         label=f"({frequency:.4f}, {amplitude:.4f})",
     )
+    if not data.has_parabola:
+        axes.legend(loc="upper center", fontsize=6.5)
+        return
+    top = vertex(data)
     axes.plot(*top, "s", color=style.BLACK, markersize=5.0, label=f"({top[0]:.4f}, {top[1]:.4f})")
     step = float(np.diff(np.asarray(data.frequency, float)[:2])[0])
     reach = max(3.0 * abs(top[0] - frequency), 0.15 * step)

@@ -24,7 +24,8 @@ def stability(rows: Sequence[Mapping[str, Any]]) -> Figure:
         sign = {"origin": 0, "upper": 1, "lower": -1}[name]
         chosen = [r for r in rows if (r["equilibrium"] > 0) - (r["equilibrium"] < 0) == sign]
         label = {"origin": "$u^* = 0$", "upper": r"$u^* = \sqrt{3}$", "lower": r"$u^* = -\sqrt{3}$"}
-        look = {"color": colour, "marker": marker, "markersize": 4.0, "linestyle": "none"}
+        look = {"color": colour, "marker": marker, "markersize": 4.5, "linestyle": "none"}
+        look |= {"fillstyle": "none" if marker == "s" else "full"}
         degrees = [r["P"] for r in chosen]
         left.plot(degrees, [r["leading_jacobian"] for r in chosen], label=label[name], **look)
         right.plot(degrees, [max(r["distance"], 1e-17) for r in chosen], **look)

@@ -37,12 +37,12 @@ _FAMILIES = {
 _OTHERS = ((TEAL, "v"), ("#aa3377", "D"), ("#997700", "p"), ("#66ccee", "h"))
 _SHADES = {
     "ordered": ("#ee8866", "#8f1402", "#f4b8a4", "#5c0a00"),
-    "chimera": ("#6da8e8", "#003a7d", "#a9cdf2", "#00204a"),
+    "chimera": ("#6da8e8", "#003a7d", "#a9cdf2", "#6a4fd0"),
     "disordered": (BLACK, "#8a8a8a", "#555555", "#b0b0b0"),
 }
 
 # Any: matplotlib types its setting names as one long list of literals.
-_SETTINGS: Any = {
+SETTINGS: Any = {
     "font.size": 8.0,
     "axes.titlesize": 8.5,
     "axes.labelsize": 8.5,
@@ -67,7 +67,7 @@ def styled(make: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
 
     @wraps(make)
     def make_styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Figure:
-        with mpl.rc_context(_SETTINGS):
+        with mpl.rc_context(SETTINGS):
             return make(*args, **kwargs)
 
     return make_styled
@@ -85,7 +85,7 @@ def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
     """
     stem = Path(path_without_suffix)
     png, pdf = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".pdf")
-    with mpl.rc_context(_SETTINGS):
+    with mpl.rc_context(SETTINGS):
         figure.savefig(png, dpi=200)
         figure.savefig(pdf, dpi=200, metadata={"CreationDate": None})
     return png, pdf

@@ -33,7 +33,7 @@ def total_variations(features: Profiles) -> tuple[float, float, float]:
 
 
 def total_variation_arrays(
-    phase: ArrayLike, amplitude: ArrayLike, frequency: ArrayLike
+    phase: ArrayLike, amplitude: ArrayLike, frequency: ArrayLike, *, ring: bool = True
 ) -> tuple[float, float, float]:
     r"""Total normalised variations of three profiles along a ring of N nodes.
 
@@ -49,11 +49,14 @@ def total_variation_arrays(
     ----------
     phase, amplitude, frequency : array_like, shape (N,)
         Phase in rad.
+    ring : bool
+        Without it the nodes are a chain: node N has no next one, and the N - 1 differences are
+        divided by N - 1, so that V stays the mean over pairs of neighbours.
 
     Raises
     ------
     BadInput
-        Shapes that differ, or that are not (N,) with N >= 1.
+        Shapes that differ, or that are not (N,) with N >= 1; for a chain N >= 2.
 
     Examples
     --------
@@ -68,7 +71,10 @@ def total_variation_arrays(
             "phase, amplitude and frequency must have one shape (nodes,), not "
             + ", ".join(str(x.shape) for x in profiles)
         )
-    v_phase, v_amplitude, v_frequency = (np.abs(np.roll(x, -1) - x) for x in profiles)
+    if not ring and profiles[0].size < 2:
+        raise BadInput("a chain has at least two nodes")
+    pairs = slice(None) if ring else slice(-1)
+    v_phase, v_amplitude, v_frequency = (np.abs(np.roll(x, -1) - x)[pairs] for x in profiles)
     v_phase %= 2.0 * np.pi
     v_phase = np.minimum(v_phase, 2.0 * np.pi - v_phase)
     return (

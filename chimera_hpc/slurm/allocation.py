@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.cluster import LOOPBACK, settings
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid.tables import Slurm
-from chimera_hpc.slurm.script import LOGS, MEMORY, job_name
+from chimera_hpc.slurm.queue import KERNELS, is_of_this_node
+from chimera_hpc.slurm.script import LOGS, MEMORY, environment_lines, job_name
 from chimera_hpc.slurm.tls import fresh_certificate
-from chimera_hpc.slurm.workers import Say, tunnel, worker_settings
+from chimera_hpc.slurm.workers import Say, check_interface, tunnel, worker_settings
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -37,6 +38,7 @@ def allocation_cluster(
     """
     if "SLURM_JOB_ID" not in os.environ:
         raise BadInput("--cluster allocation: works inside a SLURM job only; see the command slurm")
+    check_interface(wishes)
     import dask
     from distributed import Client, LocalCluster
     from distributed.utils import get_ip
@@ -86,17 +88,20 @@ def _workers(store: Path, address: list[str], wishes: Slurm, log: Path) -> Itera
     with log.open("ab") as out:
         streams: dict[str, Any] = {"stdout": out, "stderr": out, "stdin": subprocess.DEVNULL}
         warm = [sys.executable, "-m", "chimera_hpc.slurm.warm", str(store)]
-        subprocess.run([*compile_once, *warm], check=False, **streams)
-        environment = os.environ | _pairs(worker_settings())
-        srun = subprocess.Popen([*step, *worker], env=environment, **streams)
+        subprocess.run([*compile_once, *_on_its_node(warm)], check=False, **streams)
+        srun = subprocess.Popen([*step, *_on_its_node(worker, *worker_settings())], **streams)
         try:
             yield
         finally:
             _end(srun)
 
 
-def _pairs(lines: list[str]) -> dict[str, str]:
-    return dict(line.removeprefix("export ").split("=", 1) for line in lines)
+def _on_its_node(words: list[str], *lines: str) -> list[str]:
+    """Return a command that sets up the environment on the node where it comes to run."""
+    # What this process found out holds for the first node.
+    forget = [f"unset {KERNELS}"] if is_of_this_node(os.environ.get(KERNELS, "")) else []
+    script = "; ".join([*forget, *environment_lines(), *lines, 'exec "$@"'])
+    return ["bash", "-c", script, "bash", *words]
 
 
 def _end(srun: subprocess.Popen[bytes]) -> None:

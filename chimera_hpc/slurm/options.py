@@ -10,12 +10,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from chimera_hpc.errors import BadInput
-from chimera_hpc.grid.parameters import nearest
-from chimera_hpc.grid.reading import parse_toml, read_text
-from chimera_hpc.grid.tables import Slurm
+from chimera_hpc.grid.reading import one_line, parse_toml, read_text
+from chimera_hpc.grid.tables import Slurm, unknown_key
 
-NAMES = ("partition", "account", "time", "mem", "workers", "array", "interface")
+NAMES = ("partition", "account", "time", "mem", "workers", "array", "at_once", "interface")
 """Keys that the command line has too."""
+_TABLE = "slurm"
 
 
 def user_file() -> Path:
@@ -30,23 +30,29 @@ def wishes(table: Slurm, given: Mapping[str, Any]) -> Slurm:
     Raises
     ------
     BadInput
-        For a value that is none, naming the place.
+        For a key that is none, or a value, naming the place.
     """
-    path = user_file()
-    own = parse_toml(read_text(path), str(path)).get("slurm", {}) if path.is_file() else {}
-    base = _checked(own, f"{path}: slurm")
+    base = _users_own()
     told = {name: given[name] for name in NAMES if given.get(name) is not None}
     values = base.model_dump(exclude_defaults=True) | table.model_dump(exclude_defaults=True)
-    return _checked(values | told, "slurm")
+    result = _checked(values | told, _TABLE)
+    # It would make arrays of the other jobs, too.
+    if any(option.startswith("--array") for option in result.extra):
+        raise BadInput(f"{_TABLE}: extra: --array is said by the keys array and at_once")
+    return result
+
+
+def _users_own() -> Slurm:
+    path = user_file()
+    tables = parse_toml(read_text(path), str(path)) if path.is_file() else {}
+    for name in tables:
+        if name != _TABLE:
+            raise BadInput(f"{path}: {unknown_key('', name, [_TABLE])}")
+    return _checked(tables.get(_TABLE, {}), f"{path}: {_TABLE}")
 
 
 def _checked(values: Any, where: str) -> Slurm:
     try:
         return Slurm.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        if first["type"] == "extra_forbidden":
-            hint = nearest(key, list(Slurm.model_fields))
-            raise BadInput(f"{where}.{key}: unknown key{hint}") from None
-        raise BadInput(f"{where}.{key}: {first['msg']}: {first['input']!r}") from None
+        raise BadInput(f"{where}: {one_line(error, list(Slurm.model_fields))}") from None

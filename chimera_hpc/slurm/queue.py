@@ -19,6 +19,8 @@ from pathlib import Path
 from chimera_hpc.errors import BadInput
 
 TRIES = 5
+KERNELS = "NUMBA_CACHE_DIR"
+"""Environment variable: the folder of compiled kernels."""
 _FIRST_PAUSE = 0.5
 _LONGEST_PAUSE = 30.0
 _COMMAND_SECONDS = 60.0
@@ -100,7 +102,16 @@ def _run(command: Sequence[str], text: str | None) -> tuple[int, str, str]:
 def environment() -> dict[str, str]:
     """Return the environment for SLURM's commands: a job that submits others hands on no limits."""
     kept = ("SLURM_CONF", "SLURM_CLUSTERS")
-    return {k: v for k, v in os.environ.items() if not k.startswith("SLURM_") or k in kept}
+    chosen = {k: v for k, v in os.environ.items() if not k.startswith("SLURM_") or k in kept}
+    if is_of_this_node(chosen.get(KERNELS, "")):
+        del chosen[KERNELS]
+    return chosen
+
+
+def is_of_this_node(folder: str) -> bool:
+    """Return whether a job's script chose this folder of kernels, for the node that it ran on."""
+    node = os.environ.get("SLURMD_NODENAME")
+    return node is not None and Path(folder).name == f"numba-{node}"
 
 
 def one_line(text: str) -> str:
@@ -115,12 +126,17 @@ def check(script: str, *options: str) -> None:
     Raises
     ------
     BadInput
-        With SLURM's reason, when it refuses.
+        With SLURM's reason, when it refuses or does not answer.
     """
     try:
         ask("sbatch", "--test-only", *options, text=script)
     except SlurmFailed as error:
-        raise BadInput(f"SLURM refuses the job: {error}") from None
+        raise _refusal(error) from None
+
+
+def _refusal(error: SlurmFailed) -> BadInput:
+    what = "does not answer" if _TRANSIENT.search(str(error)) else "refuses the job"
+    return BadInput(f"SLURM {what}: {error}")
 
 
 def submit(script: Path, *options: str, name: str | None = None) -> str:
@@ -138,7 +154,7 @@ def submit(script: Path, *options: str, name: str | None = None) -> str:
     try:
         answer = _ask(("sbatch", "--parsable", *named, *options, str(script)), None, TRIES, settled)
     except SlurmFailed as error:
-        raise BadInput(f"SLURM refuses the job: {error}") from None
+        raise _refusal(error) from None
     return answer.partition(";")[0].strip()
 
 
@@ -147,6 +163,22 @@ def jobs(prefix: str = "") -> list[Job]:
     out = ask("squeue", "-h", "-r", "-u", str(os.getuid()), "-o", "%i|%T|%r|%j")
     found = [Job(*line.split("|", 3)) for line in out.splitlines() if line.count("|") >= 3]
     return [job for job in found if job.name.startswith(prefix) and job.state not in _ENDING]
+
+
+def waits_for(job: str, name: str, seconds: float = 5.0) -> str | None:
+    """Return why a job that was just submitted under a name waits; None when it has begun.
+
+    SLURM needs a moment to look at it, which is waited for.
+    """
+    until = time.monotonic() + seconds
+    while True:
+        mine = [one for one in jobs(name) if one.id.partition("_")[0] == job]
+        waiting = [one.reason for one in mine if one.state == "PENDING"]
+        if len(waiting) < len(mine) or not mine:
+            return None
+        if waiting[0] != "None" or time.monotonic() > until:
+            return waiting[0] if waiting[0] != "None" else "SLURM gives no reason yet"
+        time.sleep(0.3)
 
 
 def cancel(ids: Sequence[str]) -> None:
@@ -177,6 +209,21 @@ def time_left(job: str) -> float | None:
     except (SlurmFailed, BadInput):
         return None
     return seconds_of(out.splitlines()[0]) if out else None
+
+
+def limit_seconds(text: str) -> float:
+    """Return the seconds of a time limit as `sbatch --time` takes it.
+
+    >>> limit_seconds("30"), limit_seconds("1:30"), limit_seconds("1-12"), limit_seconds("2:00:00")
+    (1800.0, 90.0, 129600.0, 7200.0)
+    """
+    days, dash, rest = text.rpartition("-")
+    parts = [float(part) for part in rest.split(":")]
+    if dash or len(parts) == 3:
+        hours, minutes, seconds = (*parts, 0.0, 0.0)[:3]
+    else:
+        hours, minutes, seconds = 0.0, *(*parts, 0.0)[:2]
+    return ((float(days or 0) * 24 + hours) * 60 + minutes) * 60 + seconds
 
 
 def seconds_of(text: str) -> float | None:

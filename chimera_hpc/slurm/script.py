@@ -90,19 +90,22 @@ class Target:
         """Return the options for going on after the time limit."""
         return ("--resubmit", str(self.resubmit)) if self.resubmit else ()
 
+    def words(self) -> list[str]:
+        """Return what tells the sweep: the job file with what overrides it, and the folder."""
+        sets = [word for text in self.overrides for word in ("--set", text)]
+        return [str(self.job), "--out", str(self.folder), *sets]
+
     def run(self, *words: str) -> str:
         """Return the line that runs the job file."""
-        sets = [word for text in self.overrides for word in ("--set", text)]
-        return self.command("run", str(self.job), "--out", str(self.folder), *words, *sets)
+        return self.command("run", *self.words(), *words)
 
 
 def array_script(target: Target, wishes: Slurm) -> str:
     """Return a job array: each element does its share of the blocks, with nobody between."""
     n = wishes.array or ARRAY
-    options = [f"--array=0-{n - 1}", "--ntasks=1", f"--mem={wishes.mem or MEMORY}"]
-    what = (
-        [str(target.folder)] if target.planned else [str(target.job), "--out", str(target.folder)]
-    )
+    most = f"%{wishes.at_once}" if wishes.at_once else ""
+    options = [f"--array=0-{n - 1}{most}", "--ntasks=1", f"--mem={wishes.mem or MEMORY}"]
+    what = [str(target.folder)] if target.planned else target.words()
     lines = [
         compile_line(target.python, target.folder if target.planned else target.job),
         target.command("shard", *what, "--of", str(n), *target.again()),
@@ -136,6 +139,13 @@ def reduce_script(target: Target, wishes: Slurm) -> str:
     options = ["--ntasks=1", "--mem=4G"]
     words = ["reduce", str(target.folder), "--complete"]
     return _script(target, wishes, options, target.command(*words), "%j")
+
+
+def worker_request(store: Path, wishes: Slurm) -> str:
+    """Return a script that asks for what the job of one worker asks for, to be tested only."""
+    target = Target(store, store.parent, job_name(store, "test"))
+    options = ["--ntasks=1", f"--mem={wishes.mem or MEMORY}"]
+    return _script(target, wishes, options, "true", "%j")
 
 
 SCRIPTS = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -76,17 +76,19 @@ def fresh_certificate(name: str, store: Path) -> Iterator[Certificate]:
     try:
         certificate = Certificate(folder)
         _write(certificate)
-        note = {"store": str(store), "process": process_mark()}
+        job = os.environ.get("SLURM_JOB_ID")
+        note = {"store": str(store), "process": process_mark(), "job": job}
         create_exclusively(folder / _NOTE, json.dumps(note).encode())
         yield certificate
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def remove_left_over(store: Path) -> list[Path]:
+def remove_left_over(store: Path, cancelled: Collection[str] = ()) -> list[Path]:
     """Delete the certificates of runs on a store whose driver is gone; return their folders.
 
-    A driver on another machine can't be asked; its certificate goes too, which ends its run.
+    A driver in a job that was cancelled may still breathe, but has no time to clear up. One on
+    another machine can't be asked; its certificate goes too, which ends its run.
     """
     found = []
     for note in sorted(home().glob(f"*/{_NOTE}")):
@@ -94,7 +96,8 @@ def remove_left_over(store: Path) -> list[Path]:
             info = json.loads(note.read_bytes())
         except (OSError, ValueError):
             continue
-        if info.get("store") == str(store) and not _is_alive_here(str(info.get("process"))):
+        doomed = info.get("job") in cancelled or not _is_alive_here(str(info.get("process")))
+        if info.get("store") == str(store) and doomed:
             shutil.rmtree(note.parent, ignore_errors=True)
             found.append(note.parent)
     return found

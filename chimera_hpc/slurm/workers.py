@@ -14,9 +14,11 @@ import signal
 import socket
 import sys
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +35,7 @@ from chimera_hpc.slurm.script import (
     compile_line,
     environment_lines,
     job_name,
+    worker_request,
 )
 from chimera_hpc.slurm.tls import Certificate, fresh_certificate
 from chimera_hpc.slurm.walltime import WORKER
@@ -40,9 +43,12 @@ from chimera_hpc.slurm.walltime import WORKER
 if TYPE_CHECKING:
     from distributed import Client
 
-_LOOK_SECONDS = 3.0
-_LONGEST_LOOK = 30.0
+_LOOK_SECONDS = 1.0
+"""How often the workers are counted, which costs nothing."""
+_FIRST_PAUSE, _LONGEST_PAUSE = 2.0, 30.0
+"""Pauses between questions to SLURM while workers are missing."""
 _BOOKS_SECONDS = 0.5
+_EXTRA = "--cluster slurm needs the extra: pip install 'chimera_hpc[slurm]'"
 Say = Callable[[str], None]
 
 
@@ -58,18 +64,27 @@ class Keeper(threading.Thread):
         self._over = threading.Event()
         self._told: str | None = None
         self._lost = 0
-        self._waiting = True
 
     def run(self) -> None:
-        """Look again and again, seldom while all is well, until `close`."""
-        pause = _LOOK_SECONDS
-        while not self._over.wait(pause):
+        """Count the workers until `close`; ask SLURM about those that are not there.
+
+        It is asked soon when one is lost, and less and less often about jobs that wait.
+        """
+        pause, asked, before = _FIRST_PAUSE, time.monotonic(), 0
+        while not self._over.wait(_LOOK_SECONDS):
+            there = len(self.cluster.scheduler.workers)
+            if there >= self.wanted or there < before:
+                pause = _FIRST_PAUSE
+            before = there
+            if there >= self.wanted or time.monotonic() - asked < pause:
+                continue
             try:
-                well = self._look()
+                waiting = self._look(there)
             except (SlurmFailed, BadInput) as error:
-                well = True
+                waiting = True
                 self._tell(str(error))
-            pause = min(2 * pause, _LONGEST_LOOK) if well else _LOOK_SECONDS
+            asked = time.monotonic()
+            pause = min(2 * pause, _LONGEST_PAUSE) if waiting else _FIRST_PAUSE
 
     def close(self) -> None:
         """Stop looking."""
@@ -79,14 +94,12 @@ class Keeper(threading.Thread):
         """Return whether workers may still come; raise BadInput when they keep ending at once."""
         if self.failure is not None:
             raise BadInput(self.failure)
-        return self._waiting
+        return True
 
-    def _look(self) -> bool:
-        there = len(self.cluster.scheduler.workers)
+    def _look(self, there: int) -> bool:
+        """Replace jobs that have ended; return whether the missing workers are waited for."""
         if there:
             self._lost = 0
-        if there >= self.wanted:
-            return True
         wished = set(self.cluster.worker_spec)
         mine = [(n, job) for n, job in list(self.cluster.workers.items()) if n in wished]
         queued = {job.id: job for job in queue.jobs(self.name_of_jobs)}
@@ -103,8 +116,9 @@ class Keeper(threading.Thread):
             self.say(f"worker jobs that have ended are replaced: {len(dead)}")
             self.cluster.loop.add_callback(self._replace, dead)
         if self._lost > 2 * self.wanted + 2:
-            self.failure = f"{self._lost} worker jobs ended without a worker; see {self.logs}"
-        return bool(waiting) and not dead
+            ended = f"{self._lost} worker jobs ended without a worker; see {self.logs}"
+            self.failure = refused[0] if refused else ended
+        return bool(refused or (waiting and not dead))
 
     def _replace(self, dead: list[Any]) -> None:
         """Forget dead jobs and submit others; in the event loop's own thread."""
@@ -122,6 +136,27 @@ class Keeper(threading.Thread):
         if line != self._told:
             self._told = line
             self.say(line)
+
+
+def check_wishes(wishes: Slurm, store: Path) -> None:
+    """Ask, before anything is begun, whether SLURM would take the job of a worker.
+
+    Raises
+    ------
+    BadInput
+        When it would not, or what is needed here is not there.
+    """
+    check_interface(wishes)
+    queue.check(worker_request(store, wishes))
+    if any(find_spec(name) is None for name in ("dask_jobqueue", "cryptography")):
+        raise BadInput(_EXTRA)
+
+
+def check_interface(wishes: Slurm) -> None:
+    """Raise BadInput when this machine has no such network interface."""
+    known = [name for _, name in socket.if_nameindex()]
+    if wishes.interface is not None and wishes.interface not in known:
+        raise BadInput(f"interface {wishes.interface}: not here; allowed: {', '.join(known)}")
 
 
 @contextmanager
@@ -157,7 +192,7 @@ def slurm_cluster(
     logs = store.parent / LOGS
     logs.mkdir(exist_ok=True)
     with (
-        dask.config.set(settings(patience) | {"distributed.deploy.lost-worker-timeout": "30d"}),
+        dask.config.set(settings(patience)),
         fresh_certificate(name, store) as certificate,
         _cluster(wishes, name, store, certificate) as cluster,
     ):
@@ -236,7 +271,7 @@ def _classes() -> tuple[Any, Any]:
     try:
         from dask_jobqueue.slurm import SLURMCluster, SLURMJob
     except ImportError:
-        raise BadInput("--cluster slurm needs the extra: pip install chimera_hpc[slurm]") from None
+        raise BadInput(_EXTRA) from None
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -17,6 +17,7 @@ from chimera_hpc.claims import claim_block
 from chimera_hpc.errors import BadInput
 from chimera_hpc.files import sync_tree, write_atomically
 from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.grid.together import point_keys, points_of
 from chimera_hpc.layout import BLOCK_ARRAYS
 from chimera_hpc.ledger import METADATA
 from chimera_hpc.store.template import REDUCTION, root_attributes, write_coordinates, write_root
@@ -28,14 +29,6 @@ _PATIENCE = 30.0
 """Seconds to wait for others."""
 SAME_TABLES = ("model", "integrator", "features", "keep")
 """What the points of one store have in common."""
-
-
-def points_of(sweeps: Sequence[Sweep]) -> Points:
-    """Return the points of the first sweep, then the new ones of each later sweep."""
-    points = sweeps[0].points()
-    for sweep in sweeps[1:]:
-        points = _appended(points, sweep.points())
-    return points
 
 
 @contextlib.contextmanager
@@ -121,24 +114,6 @@ def _check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> No
         raise BadInput(f"{path}: an extension must hold all points of the store, not so {row}")
     if sweep.keep.series == "first-seed" and new.row(0)["seed"] != old.row(0)["seed"]:
         raise BadInput(f"{path}: an extension may not change the first seed, whose series is kept")
-
-
-def _appended(points: Points, more: Points) -> Points:
-    new = ~np.isin(point_keys(more, points), point_keys(points))
-    columns = {
-        name: np.concatenate([column, more.columns[name][new]])
-        for name, column in points.columns.items()
-    }
-    return Points(columns, more.axes)
-
-
-def point_keys(points: Points, like: Points | None = None) -> NDArray[np.void]:
-    """Return each point as its bytes, in the order of the columns of `like`."""
-    # Adding 0 turns -0.0 into 0.0, which is the same parameter.
-    rows = [(points.columns[name] + 0).view(np.int64) for name in (like or points).columns]
-    table = np.ascontiguousarray(np.stack(rows, axis=1))
-    keys: NDArray[np.void] = table.view(np.dtype((np.void, 8 * len(rows))))[:, 0]
-    return keys
 
 
 def _stored_columns(path: Path, points: Points) -> dict[str, NDArray[Any]]:

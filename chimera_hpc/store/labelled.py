@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.errors import BadInput
@@ -22,11 +23,32 @@ STORE_NAME = "store.zarr"
 def open_sweep(path: str | Path) -> xr.Dataset:
     """Open the folder of a sweep, or its store, as a dataset with one named variable a quantity.
 
-    Features become ``amplitude(point, node)`` and so on, scalars ``V_theta(point)``, the ledger's
-    fields ``status(point)``; coordinates are the parameters and `cell`, the number of the point's
-    combination of all parameters but the seed: ``set_index(point=["cell", "seed"]).unstack()``
-    makes them dimensions. `u` and features are read when used. Raises BadInput when there is no
-    store.
+    Parameters
+    ----------
+    path : path
+        The sweep's folder, or the store.zarr in it; while the sweep runs, too.
+
+    Returns
+    -------
+    xarray.Dataset
+        Features are ``amplitude(point, node)`` and so on, scalars ``V_theta(point)``, the ledger's
+        fields ``status(point)``; all NaN where a point has no result. Coordinates are the
+        parameters and `cell`, the number of the point's combination of all parameters but the
+        seed: ``set_index(point=["cell", "seed"]).unstack()`` makes them dimensions. For each cut k
+        of the reduction, ``class_k(point)`` is the class of a run and ``modal_class_k(point)`` that
+        of its cell, as texts, empty where there is none. `u` and features are read when used. The
+        attribute `units` of each variable is its unit.
+
+    Raises
+    ------
+    BadInput
+        When there is no store, or its metadata are damaged.
+
+    Examples
+    --------
+    >>> data = chimera_hpc.open("results/quickstart")  # doctest: +SKIP
+    >>> data.where(data.P == 12, drop=True).class_3.values[:2]  # doctest: +SKIP
+    array(['chimera', 'chimera'], dtype='<U10')
     """
     # xarray takes half a second to import, and a worker has no use for it.
     import xarray as xr
@@ -52,7 +74,37 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     for name, columns in tables.items():
         for label, unit in _labels(stored[name]):
             dataset[label] = ("point", columns[label], _attributes(label, unit))
-    return dataset
+    return dataset.assign(_classes(store, ledger["status"]))
+
+
+def _classes(
+    store: Store, status: NDArray[np.int64]
+) -> dict[str, tuple[str, NDArray[np.str_], dict[str, str]]]:
+    """Return the classes of runs and cells in each cut of the last reduction."""
+    try:
+        reduction = store.reduction()
+    except BadInput:
+        return {}
+    arrays, classes = reduction.arrays, {}
+    for cut in reduction.attributes.get("cuts", []):
+        labels, modal = arrays[f"labels_{cut}"], arrays[f"modal_class_{cut}"]
+        if len(labels) != store.n_points:
+            continue  # the sweep was extended since
+        names = np.array([*reduction.attributes[f"names_{cut}"], ""])  # ends: steady, no_window, ""
+        own = np.where(
+            status == Status.STEADY, -3, np.where(status == Status.NO_WINDOW, -2, labels)
+        )
+        classes[f"class_{cut}"] = (
+            "point",
+            names[own],
+            {"long_name": f"class of the run, {cut} clusters"},
+        )
+        classes[f"modal_class_{cut}"] = (
+            "point",
+            names[modal[arrays["cell"]]],
+            {"long_name": f"most frequent class of the cell, {cut} clusters"},
+        )
+    return classes
 
 
 def _store_in(path: Path) -> Path:

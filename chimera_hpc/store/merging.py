@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from chimera_hpc.errors import BadInput
 from chimera_hpc.files import write_atomically
 from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.grid.together import point_keys, points_of
 from chimera_hpc.ledger import FIELDS
 from chimera_hpc.status import Status
 from chimera_hpc.store.blocks import BlockFiles
-from chimera_hpc.store.extension import SAME_TABLES, point_keys, points_of
+from chimera_hpc.store.extension import SAME_TABLES
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import read_run, read_work, record_work, run_numbers
 from chimera_hpc.store.template import build, create_whole

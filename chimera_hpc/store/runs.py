@@ -39,9 +39,11 @@ def read_run(path: Path, number: int) -> dict[str, Any]:
     """Return what a run wrote about itself; raise BadInput when it is not there or unreadable."""
     try:
         info = json.loads(_file(path, number).read_bytes())
-    except (OSError, ValueError):
-        raise BadInput(f"{path}: run {number} has left no readable record") from None
-    return dict(info)
+    except (OSError, ValueError, RecursionError):
+        info = None
+    if not isinstance(info, dict):
+        raise BadInput(f"{path}: run {number} has left no readable record")
+    return info
 
 
 def record_work(path: Path, number: int, info: Mapping[str, Any]) -> None:
@@ -53,7 +55,7 @@ def read_work(path: Path, number: int) -> dict[str, Any]:
     """Return what `record_work` wrote; nothing where that is not there or unreadable."""
     try:
         info = json.loads(_work(path, number).read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return info if isinstance(info, dict) else {}
 

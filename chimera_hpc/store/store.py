@@ -15,6 +15,7 @@ from chimera_hpc.claims import Claim, remove_stale
 from chimera_hpc.errors import BadInput
 from chimera_hpc.files import remove_leftovers
 from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.grid.together import points_of
 from chimera_hpc.layout import BLOCK_ARRAYS, scalar_labels, series_mask
 from chimera_hpc.ledger import (
     FAILED,
@@ -31,7 +32,7 @@ from chimera_hpc.ledger import (
 from chimera_hpc.status import Status
 from chimera_hpc.store.blocks import BlockFiles, Damage
 from chimera_hpc.store.check import find_damaged, shallow_damage
-from chimera_hpc.store.extension import exclusive, extend, points_of, repair_metadata
+from chimera_hpc.store.extension import exclusive, extend, repair_metadata
 from chimera_hpc.store.read import gather, read_series
 from chimera_hpc.store.reduction import Reduction, Variable, read_reduction, write_reduction
 from chimera_hpc.store.runs import FOLDER as RUNS

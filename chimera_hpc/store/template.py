@@ -24,6 +24,7 @@ from chimera_hpc.files import (
     write_atomically,
 )
 from chimera_hpc.grid import Points, Sweep, block_size
+from chimera_hpc.grid.parameters import look_in, model_folder
 from chimera_hpc.grid.spec import spec_digest
 from chimera_hpc.layout import (
     BLOCK_ARRAYS,
@@ -83,6 +84,7 @@ def build(path: Path, sweeps: Sequence[Sweep], points: Points, size: int) -> Non
 def root_attributes(sweeps: Sequence[Sweep], n_points: int, size: int) -> dict[str, Any]:
     """Return the attributes of the whole store; `sweeps` are the first plan and its extensions."""
     latest = sweeps[-1]
+    folder = model_folder(latest.model)
     return {
         "title": latest.title or latest.name,
         "schema": SCHEMA,
@@ -92,6 +94,7 @@ def root_attributes(sweeps: Sequence[Sweep], n_points: int, size: int) -> dict[s
         "stream_tag": STREAM_TAG,
         "n_points": n_points,
         "block_size": size,
+        **({} if folder is None else {"model_folder": folder}),
     }
 
 
@@ -119,6 +122,8 @@ def consolidate(path: Path, attributes: Mapping[str, Any] | None = None) -> None
 def check_root(path: Path, root: Mapping[str, Any]) -> Sweep:
     """Return the sweep that root metadata describe; BadInput when they contradict themselves."""
     attributes, nodes = root["attributes"], root["consolidated_metadata"]["metadata"]
+    if "model_folder" in attributes:
+        look_in(attributes["model_folder"])
     sweep = Sweep.from_dict(attributes["spec"], where=str(path))
     specs = attributes.get("specs")
     if _digest(attributes) != attributes["digest"] or not isinstance(specs, list) or not specs:

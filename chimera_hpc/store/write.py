@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.claims import Claim, ClaimLost
-from chimera_hpc.ledger import FIELDS, RESULTS, canonical, digests, read_block, table_columns
+from chimera_hpc.ledger import FIELDS, RESULTS, canonical, read_block, stored_digests, table_columns
 from chimera_hpc.status import Status
 from chimera_hpc.store.blocks import BlockFiles, DamagedChunk
 
@@ -97,7 +97,7 @@ def _rows(result: BlockResult, run: int, attempts: NDArray[np.int64]) -> Rows:
         "elapsed_us": result.elapsed_us,
         "n_windows": result.n_windows,
         "run": np.full(len(attempts), run),
-        "digest": digests(features, scalars),
+        "digest": stored_digests(features, scalars),
     }
     ledger = np.stack([fields[name] for name in FIELDS], axis=1).astype("<i8")
     rows: Rows = {"features": features, "scalars": scalars, "ledger": ledger}

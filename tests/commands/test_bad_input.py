@@ -48,6 +48,8 @@ def refused(arguments, capsys):
         ("seeds=0", ["seeds"]),
         ("seeds=[1, 1]", ["seeds"]),
         ("features.start=1000", ["features.start", "t_end"]),
+        ('reduction.show=["sigma=0.1"]', ["reduction.show", "sigma"]),
+        ('reduction.replay=["P=3 Q=9"]', ["reduction.replay", "Q"]),
         ("features.start=-1", ["features.start"]),
         ("features.n_share=10", ["n_share", "n_peaks"]),
         ("integrator.rtol=nan", ["rtol"]),

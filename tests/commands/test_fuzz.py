@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid.parameters import MODELS
 from chimera_hpc.grid.tables import TABLES
+from chimera_hpc.ledger import FIELDS, seal
 from chimera_hpc.reduce.results import read_results
 from chimera_hpc.sweep import main
 
@@ -182,11 +184,7 @@ COMMANDS = [
 def test_any_damage_to_the_attributes_of_a_store(
     copied: bool, job: Path, finished: Path, choose: st.DataObject
 ) -> None:
-    sound, folder = finished.parent / "sound", finished
-    if not sound.exists():
-        shutil.copytree(finished, sound)
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(sound, folder)
+    folder = restored(finished)
     root = folder / "store.zarr" / "zarr.json"
     root.write_bytes(spoilt(choose, root.read_bytes()))
     if not copied:
@@ -197,6 +195,71 @@ def test_any_damage_to_the_attributes_of_a_store(
     if copied:
         assert code == 0
     assert not list(folder.glob(".*.partial"))
+
+
+def restored(finished: Path) -> Path:
+    """Return the folder as it was before the example that went before."""
+    sound = finished.parent / "sound"
+    if not sound.exists():
+        shutil.copytree(finished, sound)
+    shutil.rmtree(finished)
+    return shutil.copytree(sound, finished)
+
+
+FEW = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+LOOKS = [
+    ("status", "{}", "--json"),
+    ("status", "{}", "--failures"),
+    ("why", "{}", "P=2"),
+    ("verify", "{}", "--stored"),
+]
+chunks = st.binary(max_size=300) | st.lists(
+    st.sampled_from([0, 1, 2, 3, 4, 9, 10, 255, 256]) | st.integers(-(2**63), 2**63 - 1),
+    min_size=28,
+    max_size=28,
+).map(lambda numbers: seal(np.array(numbers, dtype="<i8").tobytes()))
+
+
+@FEW
+@given(chunks, st.sampled_from(LOOKS))
+@example(seal(np.full(28, 2**40, dtype="<i8").tobytes()), LOOKS[0])
+@example(seal(np.full(28, -1, dtype="<i8").tobytes()), LOOKS[2])
+def test_any_bytes_as_a_ledger_chunk(finished: Path, data: bytes, command: tuple[str, ...]) -> None:
+    (finished / "store.zarr" / "ledger" / "c.0.0").write_bytes(data)
+    code, said = call(*(word.replace("{}", str(finished)) for word in command))
+    assert is_clean(code, said, (0, 1))
+
+
+@pytest.mark.slow
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(chunks)
+def test_any_ledger_chunk_is_mended_by_run(job: Path, finished: Path, data: bytes) -> None:
+    ledger = restored(finished) / "store.zarr" / "ledger"
+    known = [path.read_bytes() for path in sorted(ledger.glob("c.*"))]
+    (ledger / "c.0.0").write_bytes(data)
+    words = ("--cluster", "serial", "--no-figures")
+    assert call("verify", finished, "--stored", "--forget")[0] in (0, 1)
+    assert call("run", job, "--out", finished, *words)[0] == 0
+    assert call("verify", finished, "--stored")[0] == 0
+    mended = [path.read_bytes() for path in sorted(ledger.glob("c.*"))]
+    assert mended[1:] == known[1:]
+    digest = FIELDS.index("digest")
+    rows = [np.frombuffer(chunk[:-4], "<i8").reshape(4, -1) for chunk in (mended[0], known[0])]
+    assert rows[0][:, digest].tolist() == rows[1][:, digest].tolist()
+
+
+@FEW
+@given(st.data())
+def test_any_damage_to_the_record_of_a_run(finished: Path, choose: st.DataObject) -> None:
+    name = choose.draw(st.sampled_from(["1.json", "1.work.json"]))
+    file = finished / "store.zarr" / "runs" / name
+    sound = file.read_bytes()
+    look = choose.draw(st.sampled_from([("why", "P=3", "seed=1"), ("verify", "--sample", "0.1")]))
+    try:
+        file.write_bytes(spoilt(choose, sound))
+        assert is_clean(*call(look[0], finished, *look[1:]), (0,))
+    finally:
+        file.write_bytes(sound)
 
 
 @MANY

@@ -132,6 +132,17 @@ def test_verify_says_which_code_made_a_point_that_comes_out_otherwise(
     assert "run 1: python: 2.7.18 before" in out
 
 
+def test_code_that_has_changed_since_is_told_of_though_the_numbers_are_the_same(
+    finished: Path, sweep: Run
+) -> None:
+    record = finished / "store.zarr" / "runs" / "1.json"
+    record.write_text(json.dumps({**json.loads(record.read_bytes()), "python": "2.7.18"}))
+    code, out, _ = sweep("verify", finished, "--sample", "1")
+    assert code == 0
+    assert "0 different\n  run 1: python: 2.7.18 before" in out
+    assert "  since then: python: 2.7.18 before" in sweep("why", finished, "P=3", "seed=2")[1]
+
+
 @pytest.mark.parametrize("words", [["--sample", "2"], ["--sample", "nan"], ["--seed", "-1"]])
 def test_verify_refuses_shares_that_are_none(words: list[str], finished: Path, sweep: Run) -> None:
     code, _, err = sweep("verify", finished, *words)

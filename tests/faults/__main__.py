@@ -1,7 +1,8 @@
 """The fault harness: real processes, real signals, and a table of what became of the points.
 
 ``scripts/faults --trials 20`` runs each fault 20 times at random moments; ``--only TEXT`` those
-with this text in their name; ``--seed`` chooses the moments; ``--json FILE`` writes the table too.
+with this text in their name; ``--seed`` chooses the moments; ``--jobs`` how many trials run at a
+time, for they mostly wait; ``--json FILE`` writes the table too.
 """
 
 from __future__ import annotations
@@ -10,15 +11,32 @@ import argparse
 import json
 import random
 import shutil
+import signal
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 from faults import FAULTS, Impossible
-from lab import JOB, Finding, Stuck, Trial, read_points
+from lab import JOB, Child, Finding, Point, Stuck, Trial, fork, read_points
+
+Reference = dict[Point, dict[str, Any]]
+"""What an undisturbed run leaves of each point."""
+
+
+@dataclass
+class Outcome:
+    """How one trial came out."""
+
+    finding: Finding | None = None
+    impossible: str = ""
+    """Why this machine does not allow it."""
+    seconds: float = 0.0
 
 
 @dataclass
@@ -38,16 +56,28 @@ class Row:
 
     @property
     def good(self) -> bool:
+        if self.impossible:
+            return True
         held = self.recomputed <= self.allowed and self.equal == self.trials
         return held and self.lost == 0 and not self.problems
 
-    def add(self, finding: Finding) -> None:
+    def add(self, outcome: Outcome) -> None:
         self.trials += 1
-        self.lost += finding.lost
-        self.recomputed = max(self.recomputed, finding.recomputed)
-        self.allowed = finding.allowed
-        self.equal += finding.equal
-        self.problems += finding.problems
+        self.seconds += outcome.seconds
+        self.impossible = self.impossible or outcome.impossible
+        finding = outcome.finding
+        if finding is not None:
+            self.lost += finding.lost
+            self.recomputed = max(self.recomputed, finding.recomputed)
+            self.allowed = max(self.allowed, finding.allowed)
+            self.equal += finding.equal
+            self.problems += finding.problems
+
+    def verdict(self) -> str:
+        """Return a line for people, and one for each problem."""
+        judged = self.impossible or ("as it should be" if self.good else "WRONG")
+        line = f"{self.fault}: {self.trials} trials, {self.seconds:.0f} s, {judged}"
+        return "\n  ".join([line, *self.problems])
 
 
 def main() -> int:
@@ -60,15 +90,27 @@ def main() -> int:
     folder = Path(tempfile.mkdtemp(prefix="chimera-faults-", dir=args.folder))
     _import_everything(folder)
     reference = _reference(folder)
-    rows = [_row(name, folder, reference, args) for name in names]
-    if all(row.good for row in rows):
+    rows = {name: Row(name) for name in names}
+    broken_off = False
+    try:
+        for name, outcome in _trials(names, folder, reference, args):
+            rows[name].add(outcome)
+            if outcome.finding is not None and not outcome.finding.good:
+                print(f"{name}: {outcome.finding}", flush=True)
+            if rows[name].trials == args.trials:
+                print(rows[name].verdict(), flush=True)
+    except KeyboardInterrupt:
+        broken_off = True
+    good = all(row.good for row in rows.values())
+    if good:
         shutil.rmtree(folder, ignore_errors=True)
     else:
         print(f"the folders of the trials that went wrong are in {folder}")
-    print(table(rows))
+    print(table(list(rows.values())))
     if args.json:
-        args.json.write_text(json.dumps([asdict(row) | {"good": row.good} for row in rows]))
-    return 0 if all(row.good for row in rows) else 1
+        made = [asdict(row) | {"good": row.good} for row in rows.values()]
+        args.json.write_text(json.dumps(made))
+    return 130 if broken_off else 0 if good else 1
 
 
 def table(rows: list[Row]) -> str:
@@ -90,34 +132,71 @@ def table(rows: list[Row]) -> str:
     )
 
 
-def _row(
-    name: str, folder: Path, reference: dict[tuple[int, int], dict[str, object]], args: object
-) -> Row:
-    row = Row(name)
-    chance = random.Random(f"{args.seed} {name}")
+def _trials(
+    names: list[str], folder: Path, reference: Reference, args: argparse.Namespace
+) -> Iterator[tuple[str, Outcome]]:
+    """Run all trials, some at a time, each from a process of its own; yield how they came out."""
+    waiting = [(number, name) for number in range(args.trials) for name in names]
+    waiting.reverse()
+    running: dict[Child, tuple[str, Path]] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < args.jobs:
+                number, name = waiting.pop()
+                place = folder / f"{name.replace(' ', '-')}-{number}"
+                chance = random.Random(f"{args.seed} {name} {number}")
+                output = folder / f"{place.name}.txt"
+                work = partial(_trial, name, place, chance, number, reference)
+                running[Child(fork(work, output, {}), output)] = (name, place)
+            for child in [child for child in running if child.poll() is not None]:
+                name, place = running.pop(child)
+                yield name, _outcome(child, place)
+            time.sleep(0.02)
+    finally:
+        # Each of them ends its own processes.
+        for child in running:
+            child.signal(signal.SIGINT)
+        for child in running:
+            child.wait()
+
+
+def _trial(
+    name: str, folder: Path, chance: random.Random, number: int, reference: Reference
+) -> int:
+    """Run one trial, and leave word of how it came out."""
+    trial = Trial(folder, chance, number, reference)
     began = time.monotonic()
-    for number in range(args.trials):
-        trial = Trial(folder / f"{name.replace(' ', '-')}-{number}", chance, number, reference)
-        try:
-            row.add(FAULTS[name](trial))
-        except Impossible as error:
-            row.impossible = f"not run: {error}"
-            break
-        except Stuck as error:
-            row.add(Finding(0, 0, 0, False, [str(error)]))
-        finally:
-            trial.end()
-        if not trial.problems:
-            shutil.rmtree(trial.folder, ignore_errors=True)
-    row.seconds = time.monotonic() - began
-    verdict = row.impossible or ("as it should be" if row.good else "WRONG")
-    print(f"{name}: {row.trials} trials, {row.seconds:.0f} s, {verdict}", flush=True)
-    for problem in row.problems:
-        print(f"  {problem}", flush=True)
-    return row
+    try:
+        outcome = Outcome(FAULTS[name](trial))
+    except Impossible as error:
+        outcome = Outcome(impossible=f"not run: {error}")
+    except Stuck as error:
+        outcome = Outcome(Finding(0, 0, 0, False, [*trial.problems, str(error)]))
+    finally:
+        trial.end()
+    outcome.seconds = time.monotonic() - began
+    _word(folder).write_text(json.dumps(asdict(outcome)))
+    return 0
 
 
-def _reference(folder: Path) -> dict[tuple[int, int], dict[str, object]]:
+def _outcome(child: Child, folder: Path) -> Outcome:
+    """Return how a trial came out that has ended; the folder of a good one is removed."""
+    if child.code != 0:
+        problem = f"the trial itself ended with {child.code}: {child.text()[-400:]}"
+        return Outcome(Finding(0, 0, 0, False, [problem]))
+    said = json.loads(_word(folder).read_text())
+    finding = said.pop("finding")
+    outcome = Outcome(finding and Finding(**finding), **said)
+    if outcome.finding is None or outcome.finding.good:
+        shutil.rmtree(folder, ignore_errors=True)
+    return outcome
+
+
+def _word(folder: Path) -> Path:
+    return folder / "outcome.json"
+
+
+def _reference(folder: Path) -> Reference:
     """Run the sweep without a disturbance, and return what is in its store."""
     trial = Trial(folder / "reference", random.Random(0), 0, {})
     trial.resume()
@@ -150,6 +229,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="scripts/faults", description=__doc__.splitlines()[0])
     parser.add_argument("--trials", type=int, default=2, help="trials a fault (default: 2)")
     parser.add_argument("--only", default="", metavar="TEXT", help="faults with this in their name")
+    parser.add_argument("--jobs", type=int, default=4, help="trials at a time (default: 4)")
     parser.add_argument("--seed", type=int, default=0, help="chooses the moments")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the table here too")
     parser.add_argument("--folder", type=Path, help="where to work (default: a temporary folder)")

@@ -123,7 +123,7 @@ def hang_worker_for_a_while(trial: Trial) -> Finding:
     trial.wait_for_a_moment(child)
     worker = child.workers()[:1]
     _signal(worker, signal.SIGSTOP)
-    time.sleep(trial.random.uniform(0, 3 * PATIENCE))
+    time.sleep(trial.random.uniform(0, 2 * PATIENCE))
     _signal(worker, signal.SIGCONT)
     trial.ended(child, 0)
     trial.resume()
@@ -160,7 +160,7 @@ def kill_scheduler(trial: Trial) -> Finding:
     with _scheduler(trial, file) as first:
         options = ("--cluster", "scheduler-file", "--scheduler-file", str(file))
         # Time enough for another scheduler to start.
-        child = trial.start_run(*options, "--set", "run.patience=8")
+        child = trial.start_run(*options, "--set", "run.patience=30")
         trial.wait_for_a_moment(child)
         first[0].kill()
         if trial.number % 2:
@@ -177,7 +177,7 @@ def kill_scheduler(trial: Trial) -> Finding:
 
 @fault("a point that never ends")
 def never_ends(trial: Trial) -> Finding:
-    return _misbehave(trial, "forever", "integrator.time_out=0.5")
+    return _misbehave(trial, "forever", "integrator.time_out=3")
 
 
 @fault("a point that blows up")
@@ -247,7 +247,7 @@ def read_only(trial: Trial) -> Finding:
         # Nothing to be repaired there.
         trial.run("status", trial.out, expect=0)
     trial.resume()
-    return trial.finding(3 * BLOCK)
+    return trial.finding(2 * BLOCK)
 
 
 # Damage

@@ -39,18 +39,18 @@ n_share = 1
 cuts = [3]
 [run]
 block = 4
-patience = 2.0
+patience = 30.0
 """
 N_POINTS, N_BLOCKS, BLOCK = 32, 8, 4
-PATIENCE = 2.0
+PATIENCE = 30.0
 POINT_SECONDS = 0.03
-_LONGEST = 240.0
+_LONGEST = 600.0
 
 Point = tuple[int, int]
 """P and seed."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Child:
     """A process that runs one command line."""
 
@@ -72,7 +72,7 @@ class Child:
         while self.poll() is None:
             if time.monotonic() > until:
                 self.signal(signal.SIGKILL)
-                os.waitpid(self.pid, 0)
+                self.code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
                 raise Stuck(f"did not end in {seconds:.0f} s: {self.text()[-300:]}")
             time.sleep(0.01)
         assert self.code is not None
@@ -110,6 +110,11 @@ class Finding:
     allowed: int
     equal: bool
     problems: list[str]
+
+    @property
+    def good(self) -> bool:
+        held = self.recomputed <= self.allowed and self.equal
+        return held and self.lost == 0 and not self.problems
 
 
 @dataclass

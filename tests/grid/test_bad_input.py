@@ -106,6 +106,7 @@ QUICKSTART = (Path(__file__).parents[2] / "jobs" / "quickstart.toml").read_text(
         (["integrator.atol=-1e-9"], "integrator.atol = -1e-09: it should be greater than 0"),
         (["integrator.rtol=nan"], "integrator.rtol = nan: it should be a finite number"),
         (["integrator.time_out=inf"], "integrator.time_out = inf: it should be a finite number"),
+        (["features.n_peaks=2"], "features.n_peaks = 2: it should be greater than or equal to 3"),
         (["features.n_share=10"], "features.n_share: 10 must be below features.n_peaks = 10"),
         (["features.clock_node=50"], "features.clock_node: 50 is outside the ring, 0 to 49"),
         (["features.groups=51"], "features.groups: 51 is more than n_nodes = 50"),

@@ -20,8 +20,8 @@ Q = "P"
 
 def test_selection_gives_integers_and_floats_by_name():
     values = parse_selection("P=9  Q=3 epsilon=1e-1 b=-2 seed=0")
-    assert values == {"P": 9, "Q": 3, "epsilon": 0.1, "b": -2.0, "seed": 0}
-    assert [type(x) for x in values.values()] == [int, int, float, float, int]
+    assert values == {"P": 9, "Q": 3, "epsilon": 0.1, "b": -2, "seed": 0}
+    assert [type(x) for x in values.values()] == [int, int, float, int, int]
 
 
 @pytest.mark.parametrize(

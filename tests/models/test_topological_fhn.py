@@ -99,7 +99,6 @@ def test_slopes_of_a_lane_alone_have_the_bits_of_a_pack(n):
             assert alone[:, 0].tobytes() == together[:, lane].tobytes()
 
 
-
 @forms
 @pytest.mark.parametrize(("which", "sign"), [("upper", 1.0), ("lower", -1.0), ("origin", 0.0)])
 def test_homogeneous_states_stand_still_on_the_oriented_ring(form, which, sign):

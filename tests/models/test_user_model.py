@@ -95,7 +95,7 @@ def test_own_model_is_run_and_stored_like_a_built_in_one(
         (
             "def state(self, u, v): return super().state(u, v) * float('nan')",
             "MINE",
-            "the right-hand side is not finite in the initial state",
+            "the initial state is not finite",
         ),
     ],
 )

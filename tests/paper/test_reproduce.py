@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from chimera_hpc.paper.claims import read_claims
-from chimera_hpc.paper.reproduce import main
+from chimera_hpc.paper.reproduce import main, write_scoreboard
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,6 +24,18 @@ def test_judging_an_empty_folder_writes_a_scoreboard(tmp_path: Path) -> None:
     rows = json.loads((tmp_path / "results.json").read_text())["claims"]
     assert len(rows) >= 40
     assert (tmp_path / "claims.md").read_text().count("not decidable") >= 40
+
+
+def test_a_call_that_only_judges_keeps_audit_and_times(tmp_path: Path) -> None:
+    cost = {"jobs": 19, "minutes": 31.4, "cpu_minutes": 55.1, "processors": 2, "load": 2.0}
+    made = {"schema": 1, "quick": False, "claims": [], "audit": {}, "seconds": {"plane": 9.0}}
+    write_scoreboard(tmp_path, made | {"cost": cost})
+    assert main(["--only", "none", "--out", str(tmp_path)]) == 0
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert (results["cost"], results["seconds"]) == (cost, {"plane": 9.0})
+    text = (tmp_path / "claims.md").read_text()
+    assert "in 31 minutes of wall time and 55 of processor time, on 2 processors" in text
+    assert "\n\n\n" not in text
 
 
 @pytest.mark.slow
@@ -49,4 +61,6 @@ def test_the_thinned_reproduction_ends_well_and_keeps_the_claims_that_survive(
     assert len(wanted) >= 20
     assert lost == {}
     assert results["audit"]["diagonal"]["points"] >= 1
+    assert results["cost"]["cpu_minutes"] > 0.1
+    assert (tmp_path / "diagonal/figures/audit.png").is_file()
     assert "Audit of the labels" in (tmp_path / "claims.md").read_text()

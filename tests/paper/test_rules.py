@@ -4,11 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from chimera_hpc.grid import Sweep
-from chimera_hpc.paper.audit import compare, labels_of, modal_stays, variants
 from chimera_hpc.paper.evidence import Evidence, Missing, family_of, select, wanted
 from chimera_hpc.paper.rules import NOT_REPRODUCED, REPRODUCED, RULES
 
@@ -116,38 +113,3 @@ def test_printed_values_are_held_against_the_middle_95_percent(evidence) -> None
     rule = RULES["triplet"]
     assert rule(found, "job", {"P": 9}, [0.05], ["V_a"]).outcome == REPRODUCED
     assert rule(found, "job", {"P": 9}, [0.055], ["V_a"]).outcome == NOT_REPRODUCED
-
-
-def test_audit_counts_changes_and_moves() -> None:
-    found = compare(["ordered", "chimera", "chimera", "steady"], ["ordered"] * 2 + ["chimera"] * 2)
-    assert (found["changed"], found["share"]) == (2, 0.5)
-    assert found["moves"] == {"chimera to ordered": 1, "steady to chimera": 1}
-    assert found["net"] == {"chimera": 0.0, "ordered": 0.25, "steady": -0.25}
-
-
-def test_a_basin_is_audited_by_inside_and_outside() -> None:
-    status, none = np.array([1, 2]), np.full((2, 3), np.nan)
-    found = labels_of(None, status, none, np.array([0.2, 0.7]), np.array([0.5, 0.5]))
-    assert found == ["inside", "outside"]
-
-
-def test_the_ways_to_run_again_change_what_they_say_and_nothing_else() -> None:
-    sweep = Sweep.from_dict({"name": "a", "model": "topological_fhn", "grid": {"P": 3, "Q": 3}})
-    points = sweep.points()
-    made = variants(sweep, points, ("tighter", "moved", "late"))
-    assert made["tighter"][0].integrator.rtol == pytest.approx(1e-5)
-    assert made["tighter"][0].integrator.atol == pytest.approx(1e-8)
-    assert made["tighter"][1] is points
-    assert made["moved"][1].columns["delta"][0] - 1e-3 == pytest.approx(1e-13, rel=1e-3)
-    assert made["moved"][0].integrator == sweep.integrator
-    assert made["late"][0].integrator.t_end == 5000.0
-    assert made["late"][0].features.start == 4950.0
-
-
-def test_bootstrap_of_a_unanimous_cell_is_certain_and_of_a_split_one_is_not() -> None:
-    rng = np.random.default_rng(0)
-    size = {"ordered": 100, "chimera": 50}
-    assert modal_stays({"chimera": 20}, "chimera", size, rng) == 1.0
-    # P(X <= 10) for X ~ B(20, 1/2): half of the votes is enough for the larger class.
-    half = modal_stays({"ordered": 10, "chimera": 10}, "ordered", size, rng)
-    assert half == pytest.approx(0.588, abs=0.06)

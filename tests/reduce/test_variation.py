@@ -92,3 +92,11 @@ def test_shapes_that_do_not_fit_are_refused(shapes):
         total_variation_arrays(*(np.zeros(n) for n in shapes))
     with pytest.raises(BadInput, match="one shape"):
         total_variation_arrays(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
+
+
+def test_chain_has_one_difference_less_and_is_the_mean_over_its_pairs():
+    phase, amplitude, frequency = [0.0, np.pi / 2, np.pi], [1.0, 3.0, 2.0], [4.0, 4.0, 1.0]
+    found = total_variation_arrays(phase, amplitude, frequency, ring=False)
+    assert found == pytest.approx((0.5, 1.5, 1.5))
+    with pytest.raises(BadInput, match="a chain has at least two nodes"):
+        total_variation_arrays([0.0], [1.0], [1.0], ring=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from slurm_real import Slurm
-from slurm_sweeps import sweep, write_job
+from slurm_sweeps import LONG, sweep, write_job
 
 
 @pytest.fixture(scope="session")
@@ -32,11 +32,18 @@ def slurm(slurm_session: Slurm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
 @pytest.fixture(scope="session")
 def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the same sweep computed by one process."""
-    folder = tmp_path_factory.mktemp("serial")
-    done = sweep(
-        *("run", write_job(folder), "--out", folder / "out"),
-        *("--cluster", "serial", "--no-figures"),
-    )
+    """The folder of the small sweep computed by one process."""
+    return _by_one_process(write_job(tmp_path_factory.mktemp("serial")))
+
+
+@pytest.fixture(scope="session")
+def long_serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the sweep with long runs computed by one process."""
+    return _by_one_process(write_job(tmp_path_factory.mktemp("long"), LONG))
+
+
+def _by_one_process(job: Path) -> Path:
+    out = job.with_name("out")
+    done = sweep("run", job, "--out", out, "--cluster", "serial", "--no-figures")
     assert done.returncode == 0, done.stderr
-    return folder / "out"
+    return out

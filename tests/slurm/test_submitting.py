@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
 import subprocess
 import time
@@ -13,7 +15,7 @@ from slurm_sweeps import command, sweep, write_job
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.slurm import queue, tls
-from chimera_hpc.slurm.script import SCRIPTS, templates
+from chimera_hpc.slurm.script import SCRIPTS, job_name, templates
 
 pytestmark = pytest.mark.slurm
 
@@ -27,11 +29,39 @@ def test_a_refused_job_is_told_in_one_line(
     job = write_job(tmp_path)
     began = time.monotonic()
     done = sweep(how[0], job, "--out", tmp_path / "out", *how[1:], "--mem", "90000M")
+    seconds = time.monotonic() - began
     assert done.returncode == 2
-    assert time.monotonic() - began < 15
-    line = done.stderr.strip().splitlines()[-1]
+    (line,) = done.stderr.splitlines()
     assert line.startswith("error: SLURM refuses the job: ")
     assert "node configuration is not available" in line
+    # Neither a plan nor compiled kernels come before the answer.
+    assert not (tmp_path / "out").exists()
+    assert seconds < 5 * max(1.0, _load())
+
+
+def _load() -> float:
+    """Return how many processes want each core."""
+    return os.getloadavg()[0] / (os.cpu_count() or 1)
+
+
+def test_a_network_that_is_not_there_is_told_before_anything_begins(
+    slurm: Slurm, tmp_path: Path
+) -> None:
+    words = ("--cluster", "slurm", "--interface", "nowhere0")
+    done = sweep("run", write_job(tmp_path), "--out", tmp_path / "out", *words)
+    assert done.returncode == 2
+    assert re.fullmatch(r"error: interface nowhere0: not here; allowed: .*lo.*\n", done.stderr)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_machine_without_slurm_is_told_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for how in (("slurm", "--submit"), ("run", "--cluster", "slurm")):
+        done = sweep(how[0], write_job(tmp_path), "--out", tmp_path / "out", *how[1:])
+        assert done.returncode == 2
+        assert done.stderr == "error: sbatch: not found: this is no machine of a SLURM cluster\n"
 
 
 def test_the_reason_of_a_waiting_job_is_told(slurm: Slurm, tmp_path: Path) -> None:
@@ -43,15 +73,30 @@ def test_the_reason_of_a_waiting_job_is_told(slurm: Slurm, tmp_path: Path) -> No
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     log = tmp_path / "out" / "run.log"
     try:
-        slurm.until(lambda: "asked for" in _text(log), 30, "nothing submitted")
+        slurm.until(lambda: "asked for" in _text(log), 120, "nothing submitted")
         slurm.until(lambda: "jobs that wait" in _text(log), 10, "no reason told")
         assert "for Resources" in _text(log) or "for Priority" in _text(log)
         slurm.sh("scancel", blocker)
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=240)
         assert process.returncode == 0, said
     finally:
         process.kill()
         process.communicate()
+
+
+def test_what_a_submitted_job_waits_for_is_told(slurm: Slurm, tmp_path: Path) -> None:
+    words = ("slurm", write_job(tmp_path), "--out", tmp_path / "out", "--submit")
+    done = sweep(*words, "--partition", "closed")
+    assert done.returncode == 0, done.stderr
+    number = done.stdout.split()[2]
+    assert done.stdout.splitlines()[-1] == f"job {number} waits: PartitionDown"
+
+
+def test_elements_run_as_many_at_once_as_was_wished(slurm: Slurm, tmp_path: Path) -> None:
+    words = ("slurm", write_job(tmp_path), "--out", tmp_path / "out", "--submit")
+    done = sweep(*words, "--set", "slurm.extra=['--hold']", "--at-once", "3")
+    number = done.stdout.split()[2]
+    assert slurm.told(number, "ArrayTaskThrottle") == "3"
 
 
 def test_a_controller_that_fails_for_a_while_is_asked_again(
@@ -91,12 +136,24 @@ def test_arrays_are_cut_to_what_slurm_allows(slurm: Slurm, tmp_path: Path) -> No
 
 def test_cancel_ends_the_jobs_of_its_own_store_only(slurm: Slurm, tmp_path: Path) -> None:
     job = write_job(tmp_path)
+    hold = ("--set", "slurm.extra=['--hold']")
     for name in ("one", "two"):
-        sweep("slurm", job, "--out", tmp_path / name, "--array", "2", "--no-reduce", "--submit")
+        done = sweep("slurm", job, "--out", tmp_path / name, "--array", "2", *hold, "--submit")
+        assert done.returncode == 0, done.stderr
     done = sweep("cancel", tmp_path / "one")
-    assert done.stdout.count("cancelled job") >= 1
-    names = {name for _, state, name in slurm.queue() if state in ("PENDING", "RUNNING")}
-    assert len(names) <= 1
+    assert done.stdout.count("cancelled job") == 3
+    left = [name for _, _, name in slurm.queue()]
+    two = tmp_path / "two" / "store.zarr"
+    assert sorted(left) == sorted(job_name(two, what) for what in ("array", "array", "reduce"))
+    assert "no SLURM job works on" in sweep("cancel", tmp_path / "one").stdout
+
+
+def test_a_sweep_that_is_in_the_queue_is_not_submitted_twice(slurm: Slurm, tmp_path: Path) -> None:
+    words = ("slurm", write_job(tmp_path), "--out", tmp_path / "out", "--submit")
+    assert sweep(*words, "--set", "slurm.extra=['--hold']").returncode == 0
+    done = sweep(*words)
+    assert done.returncode == 2
+    assert re.search(r"job \d+\S* does this already; the command cancel ends it", done.stderr)
 
 
 def test_a_client_without_the_certificate_is_refused(tmp_path: Path, monkeypatch) -> None:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from slurm_sweeps import JOB
+from slurm_sweeps import JOB, write_job
 
+from chimera_hpc import task
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid import Sweep
 from chimera_hpc.grid.tables import Slurm
-from chimera_hpc.slurm import options, walltime
-from chimera_hpc.slurm.queue import one_line, seconds_of
+from chimera_hpc.integrate import _jit
+from chimera_hpc.slurm import options, queue, walltime, warm
+from chimera_hpc.slurm.queue import limit_seconds, one_line, seconds_of
 from chimera_hpc.slurm.script import SCRIPTS, Target, job_name
 from chimera_hpc.slurm.walltime import CostModel
 from chimera_hpc.status import Status
+from chimera_hpc.store import Store
+from chimera_hpc.sweep import main
 
 
 def small() -> Sweep:
@@ -80,6 +85,24 @@ def test_times_as_slurm_prints_them(text: str, seconds: float | None) -> None:
     assert seconds_of(text) == seconds
 
 
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("30", 1800), ("1:30", 90), ("2:00:00", 7200), ("1-12", 129600), ("1-0:30", 88200)],
+)
+def test_time_limits_as_slurm_takes_them(text: str, seconds: float) -> None:
+    assert limit_seconds(text) == seconds
+
+
+@pytest.mark.parametrize("option", [("--drain", "60"), ("--drain", "-1"), ("--resubmit", "-1")])
+def test_times_that_leave_a_job_nothing_are_refused(
+    option: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["slurm", str(write_job(tmp_path)), "--time", "1", *option]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(f"error: {option[0]} {option[1]}: allowed is 0 ")
+
+
 def test_complaints_become_one_line() -> None:
     text = "sbatch: error: Too much\nallocation failure: Too much\n"
     assert "\n" not in one_line(text)
@@ -108,13 +131,70 @@ def test_wishes_that_are_none_are_refused_with_their_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with pytest.raises(BadInput, match=r"slurm\.mem: .*: '1 potato'"):
+    with pytest.raises(BadInput, match=r"slurm: mem = '1 potato': "):
         options.wishes(Slurm.model_validate({}), {"mem": "1 potato"})
     own = tmp_path / "chimera_hpc" / "config.toml"
     own.parent.mkdir()
-    own.write_text('[slurm]\npartitoin = "x"\n')
-    with pytest.raises(BadInput, match=r"partitoin: unknown key.*partition"):
-        options.wishes(Slurm.model_validate({}), {})
+    for text, told in (
+        ('[slurm]\npartitoin = "x"', "slurm: partitoin: unknown key; did you mean partition?"),
+        ('partition = "x"', "partition: unknown key; it belongs in [slurm]"),
+        ('[slurrm]\npartition = "x"', "slurrm: unknown key; did you mean slurm?"),
+    ):
+        own.write_text(text)
+        with pytest.raises(BadInput, match=re.escape(f"{own}: {told}")):
+            options.wishes(Slurm.model_validate({}), {})
+
+
+def test_an_unknown_key_of_the_jobs_table_is_refused_with_the_nearest_one() -> None:
+    text = JOB.format(t_end=100.0, block=4).replace("interface =", "interfaec =")
+    with pytest.raises(BadInput, match=r"slurm.interfaec: unknown key; did you mean interface\?"):
+        Sweep.from_toml_text(text)
+
+
+def test_the_kernels_are_compiled_once_for_a_job_file_a_folder_and_its_store(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(_jit, "cache_folder", lambda: str(tmp_path))
+    compiled = []
+    monkeypatch.setattr(task, "warm_up", lambda sweep, points: compiled.append(sweep.digest))
+    job = write_job(tmp_path)
+    store = Store.plan(tmp_path / "out" / "store.zarr", small())
+    for path in (job, job, tmp_path / "out", tmp_path / "out", store.path):
+        warm.main(path)
+    assert compiled == [small().digest] * 2
+    marks = list(tmp_path.glob("compiled-*"))
+    assert len(marks) == 2
+    for mark in marks:
+        mark.write_text(str(tmp_path / "gone"))
+    warm.main(job)
+    assert len(compiled) == 3
+
+
+def test_a_worker_does_not_get_the_kernels_of_its_drivers_node(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("SLURMD_NODENAME", "n1")
+    monkeypatch.setenv("SLURM_JOB_ID", "7")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/shared/chimera_hpc/numba-n1")
+    assert not {"NUMBA_CACHE_DIR", "SLURM_JOB_ID"} & set(queue.environment())
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/scratch/kernels")
+    assert queue.environment()["NUMBA_CACHE_DIR"] == "/scratch/kernels"
+
+
+def test_a_script_for_a_sweep_that_is_not_planned_says_all_that_plans_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job, out = write_job(tmp_path), tmp_path / "out"
+    assert main(["slurm", str(job), "--out", str(out), "--set", "seeds=2", "--block", "8"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    sets = "--set seeds=2 --set run.block=8"
+    assert last.endswith(f"sweep shard {job} --out {out} {sets} --of 4")
+
+
+def test_arrays_of_all_jobs_are_refused() -> None:
+    with pytest.raises(BadInput, match="--array is said by the keys array and at_once"):
+        options.wishes(Slurm.model_validate({"extra": ["--array=0-63%8"]}), {})
 
 
 @pytest.mark.parametrize("mode", list(SCRIPTS))

@@ -1,0 +1,226 @@
+"""Features, variations and class of a prepared recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.features import FourierFeatures, fourier_features
+from chimera_hpc.features.windows import maxima
+from chimera_hpc.grid.tables import Features
+from chimera_hpc.outputs.atlases import load_atlas
+from chimera_hpc.recordings.gaps import called
+from chimera_hpc.recordings.prepare import Prepared
+from chimera_hpc.reduce import tree
+from chimera_hpc.reduce.atlas import Atlas
+from chimera_hpc.reduce.results import TRIPLET
+from chimera_hpc.reduce.variation import total_variation_arrays
+from chimera_hpc.status import Status
+from chimera_hpc.store import Store
+
+Array = NDArray[np.float64]
+
+FEW_SAMPLES = 20.0
+"""Samples a period below which maxima, and with them windows, are placed too coarsely."""
+_BLOCKS = 20
+_MAXIMA = 1.02
+"""Maxima a turn of the clock beyond which some are put down to noise."""
+_ALIKE = 3.0
+"""Factor between frequencies from which units of time are taken for different."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """An atlas with what is to be known of the sweep that it comes from."""
+
+    path: Path
+    atlas: Atlas
+    step: float
+    settings: Features
+    frequency: float
+    """Median over runs and nodes."""
+    amplitude: float
+
+    @classmethod
+    def load(cls, path: Path) -> Judge:
+        """Read the atlas of a reduced sweep, from its folder or its store; BadInput without one."""
+        folder = path.parent if (path / "zarr.json").is_file() else path
+        atlas = load_atlas(folder)
+        if not atlas.names:
+            raise BadInput(f"{folder}: no run of this sweep oscillates: it has no classes")
+        store = Store.open(folder / "store.zarr")
+        frequency, amplitude = _typical(store)
+        sweep = store.sweep
+        return cls(folder, atlas, sweep.integrator.t_step, sweep.features, frequency, amplitude)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The class of a triplet by an atlas, and how far to trust it."""
+
+    name: str
+    distance: float
+    """To the nearest training point, in scaled variations."""
+    confidence: float
+    """Share of the training points whose own nearest neighbour is at least as far away."""
+    other: str
+    """The nearest other class."""
+    other_distance: float
+
+    @property
+    def sentence(self) -> str:
+        """How far to trust it, in words."""
+        if self.confidence >= 0.05:
+            where = "among the atlas's own runs"
+        elif self.distance < self.other_distance / 2:
+            where = "outside the atlas's runs, but nearest to this class by far"
+        else:
+            where = "outside the atlas's runs: it has little to say here"
+        return where
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What came out of a recording."""
+
+    features: FourierFeatures
+    triplet: tuple[float, float, float]
+    samples_a_period: float
+    """Of the recording, for the fastest node; NaN without features."""
+    verdict: Verdict | None
+    warnings: tuple[str, ...]
+
+    @property
+    def name(self) -> str | None:
+        """The class: of the atlas, or ``steady`` or ``no_window``; None without an atlas."""
+        if self.features.status is not Status.DONE:
+            return self.features.status.name.lower()
+        return None if self.verdict is None else self.verdict.name
+
+
+def measure(made: Prepared, settings: Features, ring: bool, judge: Judge | None) -> Measured:
+    """Measure signals on an even grid, and judge them by an atlas if there is one.
+
+    Parameters
+    ----------
+    made : Prepared
+    settings : Features
+        Windows, clock and the other settings; ``start`` and ``groups`` are not used.
+    ring : bool
+        Whether the last node is a neighbour of the first.
+    judge : Judge or None
+
+    Raises
+    ------
+    BadInput
+        Fewer than three nodes (two for a chain), or as `fourier_features`.
+    """
+    n_nodes, least = made.u.shape[1], 3 if ring else 2
+    if n_nodes < least:
+        raise BadInput(f"{n_nodes} nodes: a {'ring' if ring else 'chain'} has at least {least}")
+    features = features_of(made, settings)
+    triplet = total_variation_arrays(
+        features.phase, features.amplitude, features.frequency, ring=ring
+    )
+    warnings = []
+    fastest = float(np.nanmax(np.append(features.frequency, 0.0)))
+    samples = 1.0 / (fastest * made.recorded_step) if fastest > 0.0 else float("nan")
+    for what, step in (("the recording", made.recorded_step), ("the grid", made.step)):
+        count = 1.0 / (fastest * step) if fastest > 0.0 else FEW_SAMPLES
+        if count < FEW_SAMPLES and (step, what) != (made.recorded_step, "the grid"):
+            node = called(made.names[int(np.nanargmax(features.frequency))])
+            warnings.append(
+                f"{what} has {count:.3g} samples a period ({node}); below "
+                f"{FEW_SAMPLES:g} maxima and windows are placed coarsely"
+            )
+    warnings += _noise(made, settings, features)
+    verdict = None
+    if judge is not None and features.status is Status.DONE:
+        verdict = verdict_of(judge.atlas, np.array(triplet))
+        warnings += _unlike(features, judge)
+    return Measured(features, triplet, samples, verdict, tuple(warnings))
+
+
+def features_of(made: Prepared, settings: Features) -> FourierFeatures:
+    """Return the Fourier features of a prepared recording."""
+    names = set(Features.model_fields) - {"start", "groups"}
+    options: dict[str, Any] = {name: getattr(settings, name) for name in names}
+    return fourier_features(made.t, made.u, **options)
+
+
+def verdict_of(atlas: Atlas, triplet: Array) -> Verdict:
+    """Judge one triplet (3,) by an atlas.
+
+    The class is that of the nearest training point. The confidence compares the distance to it with
+    the distances of the training points to one another.
+    """
+    found = atlas.classify(triplet)
+    label, distance = int(found.label[0]), float(found.distance[0])
+    spacing = np.asarray(cKDTree(atlas.points).query(atlas.points, k=2)[0])[:, 1]
+    others = atlas.labels != label
+    name, far = "", float("inf")
+    if others.any():
+        scaled = tree.scale(triplet[None], atlas.scaler)
+        away, nearest = cKDTree(atlas.points[others]).query(scaled[0])
+        name, far = atlas.names[int(atlas.labels[others][nearest])], float(away)
+    confidence = float(np.mean(spacing >= distance))
+    return Verdict(found.name[0], distance, confidence, name, far)
+
+
+def scale_to(features: FourierFeatures, judge: Judge) -> tuple[float, float]:
+    """Return the factors on times and signals that make their medians those of the atlas."""
+    if features.status is not Status.DONE:
+        raise BadInput(f"--rescale: {features.status.sentence}")
+    frequency = float(np.median(features.frequency))
+    amplitude = float(np.median(features.amplitude))
+    if not (frequency > 0.0 and amplitude > 0.0 and judge.frequency > 0.0):
+        raise BadInput("--rescale: half of the nodes stand still")
+    return frequency / judge.frequency, judge.amplitude / amplitude
+
+
+def _noise(made: Prepared, settings: Features, features: FourierFeatures) -> list[str]:
+    """Return a line where the clock has many more maxima than turns: windows follow them."""
+    if features.status is not Status.DONE:
+        return []
+    node = settings.clock_node
+    count = len(maxima(np.ascontiguousarray(made.u[:, node])))
+    turns = float(features.frequency[node] * (made.t[-1] - made.t[0]))
+    if count <= _MAXIMA * turns + 1.0:
+        return []
+    return [
+        f"{called(made.names[node])}, the clock, has {count} maxima in {turns:.0f} turns: noise? "
+        "Windows follow the maxima; --lowpass F damps frequencies above F"
+    ]
+
+
+def _unlike(features: FourierFeatures, judge: Judge) -> list[str]:
+    """Return a line where the recording's unit of time seems to be another one."""
+    frequency = float(np.median(features.frequency))
+    ratio = max(frequency, 1e-300) / judge.frequency
+    if 1.0 / _ALIKE < ratio < _ALIKE:
+        return []
+    return [
+        f"the median frequency is {frequency:.3g}, that of the atlas's runs {judge.frequency:.3g}: "
+        "V_Omega has the unit of frequency and V_a that of the signal; --factors or --rescale"
+    ]
+
+
+def _typical(store: Store) -> tuple[float, float]:
+    """Return median frequency and amplitude over nodes and oscillating runs of some blocks."""
+    done = store.ledger()["status"] == Status.DONE
+    blocks = np.unique(np.flatnonzero(done) // store.block_size)
+    some = blocks[np.unique(np.linspace(0, len(blocks) - 1, _BLOCKS).astype(np.int64))]
+    tables = [store.files.read("features", int(block)) for block in some]
+    table = np.concatenate(tables)
+    return float(np.nanmedian(table[:, 1])), float(np.nanmedian(table[:, 0]))
+
+
+def triplet_table(triplet: tuple[float, float, float]) -> dict[str, float]:
+    """Return the variations by their names."""
+    return dict(zip(TRIPLET, triplet, strict=True))

@@ -1,0 +1,228 @@
+"""From a recording to signals on an even grid of times without a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch
+from chimera_hpc.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+_EVEN = 1e-2
+"""Largest departure of a time from an even grid, in steps: as `fourier_features` allows."""
+_SAME = 1e-6
+"""Relative difference below which two steps are the same."""
+_MOST = 2 * 10**8
+"""Most numbers of a series after interpolation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Signals ready to be measured.
+
+    Attributes
+    ----------
+    t, u : shape (T,), (T, N)
+        Even times, finite values.
+    step, recorded_step : float
+        Step of these times, and of the recording.
+    names : tuple of str
+        Names of the nodes, in the order of the columns.
+    gaps : tuple of Gap
+        All that is missing in the recording, longest first.
+    notes, warnings : tuple of str
+        What was done, and what speaks against it, a line each.
+    """
+
+    t: Array
+    u: Array
+    step: float
+    recorded_step: float
+    names: tuple[str, ...]
+    gaps: tuple[Gap, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def with_times(recording: Recording, step: float | None) -> Recording:
+    """Give a recording without times those of `step`.
+
+    Raises
+    ------
+    BadInput
+        Neither has times, or both; times that are not finite or do not rise.
+    """
+    if recording.t is None:
+        if step is None:
+            raise BadInput("the file has no times: --step X gives the time between two samples")
+        if not (np.isfinite(step) and step > 0.0):
+            raise BadInput(f"--step {step}: a number above 0 is needed")
+        t = step * np.arange(len(recording.u), dtype=np.float64)
+        return Recording(t, recording.u, recording.names, recording.notes)
+    t = recording.t
+    if step is not None:
+        raise BadInput("the file has times of its own: leave --step out")
+    wrong = np.flatnonzero(~np.isfinite(t))
+    if len(wrong):
+        raise BadInput(f"time {wrong[0]} (from 0) is missing")
+    falls = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(falls):
+        i = int(falls[0])
+        raise BadInput(f"times must rise: {t[i + 1]:.9g} follows {t[i]:.9g} (samples {i}, {i + 1})")
+    return recording
+
+
+def in_order(recording: Recording, order: str | None) -> Recording:
+    """Put the nodes into an order: names or numbers from 0 with commas, or a file of them.
+
+    Nodes that are not named are left out. Raises BadInput for others, and for one named twice.
+    """
+    if order is None:
+        return recording
+    text = Path(order).read_text(encoding="utf-8") if Path(order).is_file() else order
+    words = [word for word in text.replace(",", " ").split() if word]
+    columns = [_column(recording.names, word) for word in words]
+    if len(set(columns)) < len(columns):
+        twice = next(word for word in words if words.count(word) > 1)
+        raise BadInput(f"--order: {twice} is there twice")
+    if not columns:
+        raise BadInput("--order: no node is named")
+    names = tuple(recording.names[i] for i in columns)
+    left = recording.u.shape[1] - len(columns)
+    note = f"{len(columns)} nodes in the order given" + (f", {left} left out" if left else "")
+    return Recording(recording.t, recording.u[:, columns], names, (*recording.notes, note))
+
+
+def _column(names: Sequence[str], word: str) -> int:
+    if word in names:
+        return names.index(word)
+    if word.isdecimal() and int(word) < len(names):
+        return int(word)
+    raise BadInput(f"--order: {word} is no node; there are {len(names)}: {names[0]} to {names[-1]}")
+
+
+def prepare(
+    recording: Recording,
+    step: float | None,
+    *,
+    span: tuple[float | None, float | None] = (None, None),
+    bridge: int = 3,
+    scale: tuple[float, float] = (1.0, 1.0),
+    lowpass: float | None = None,
+) -> Prepared:
+    """Cut out what is whole and put it on an even grid.
+
+    Parameters
+    ----------
+    recording : Recording
+        With times.
+    step : float or None
+        Step of the grid, None for the recording's own. A recording that has this step is taken as
+        it is; any other is interpolated by cubic splines.
+    span : (float, float)
+        First and last time to take, None for the recording's own.
+    bridge : int
+        Samples that may be missing in a row: they are interpolated. At a longer gap the recording
+        is cut, and its longest part taken.
+    scale : (float, float)
+        Factors on times and on signals.
+    lowpass : float, optional
+        Frequency, in the recording's unit, above which signals are damped, without a shift of
+        phase: a Butterworth filter of order 4 that runs forwards and backwards.
+
+    Raises
+    ------
+    BadInput
+        Nothing is left, or ``lowpass`` is not below half the sampling frequency.
+    """
+    assert recording.t is not None
+    t, u = recording.t * scale[0], np.where(np.isfinite(recording.u), recording.u, np.nan)
+    u *= scale[1]
+    first, last = (x if x is None else x * scale[0] for x in span)
+    inside = (t >= (t[0] if first is None else first)) & (t <= (t[-1] if last is None else last))
+    t, u = t[inside], u[inside]
+    if len(t) < 3:
+        raise BadInput(f"{len(t)} samples between --start and --end: too few")
+    _refuse_empty(u, recording.names)
+    usual = float(np.median(np.diff(t)))
+    gaps = find_gaps(t, u, usual)
+    part = longest_stretch(t, u, usual, bridge)
+    notes, warned = list(recording.notes), []
+    if gaps:
+        values, times = int(np.isnan(u).sum()), sum(g.samples for g in gaps if g.node is None)
+        counts = {"values": values, "times": times}
+        what = " and ".join(f"{n} {name}" for name, n in counts.items() if n)
+        many = "1 gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
+        warned.append(f"{what} missing, in {many}")
+    if part.stop - part.start < 3:
+        raise BadInput(f"no stretch without gaps of more than {bridge} samples (--bridge)")
+    if part.stop - part.start < len(t):
+        warned.append(
+            f"taken: {t[part][0]:.6g} to {t[part][-1]:.6g}, {part.stop - part.start} of {len(t)} "
+            f"samples, the longest stretch without gaps of more than {bridge} samples"
+        )
+    made_t, made_u, note = _on_grid(t[part], u[part], usual, step)
+    if lowpass is not None:
+        made_u = _smooth(made_u, lowpass / scale[0], made_t, usual)
+        notes.append(f"frequencies above {lowpass:g} damped (--lowpass)")
+    return Prepared(
+        *(made_t, made_u, float(made_t[1] - made_t[0]) if step is None else step, usual),
+        *(recording.names, tuple(gaps), (*notes, note), tuple(warned)),
+    )
+
+
+def _on_grid(t: Array, u: Array, usual: float, step: float | None) -> tuple[Array, Array, str]:
+    own = float(t[-1] - t[0]) / (len(t) - 1)
+    even = float(np.abs(t - (t[0] + own * np.arange(len(t)))).max()) <= _EVEN * own
+    wanted = (own if even else usual) if step is None else step
+    whole = not np.isnan(u).any()
+    if even and whole and abs(own - wanted) <= _SAME * wanted:
+        return t, u, f"{len(t)} samples at a step of {own:.6g}, as recorded"
+    count = int((t[-1] - t[0]) / wanted + 1e-6) + 1
+    if count < 3 or count * u.shape[1] > _MOST:
+        raise BadInput(
+            f"at a step of {wanted:.6g} this is {count} samples; --factors T,U brings the unit of "
+            "time to the atlas's"
+        )
+    grid = t[0] + wanted * np.arange(count)
+    why = [] if even else ["uneven times"]
+    why += [] if whole else ["missing values"]
+    why += [] if abs(own - wanted) <= _SAME * wanted else [f"recorded at {usual:.6g}"]
+    if whole:
+        made = CubicSpline(t, u)(np.minimum(grid, t[-1]))
+    else:
+        made = np.empty((count, u.shape[1]))
+        for node in range(u.shape[1]):
+            known = ~np.isnan(u[:, node])
+            made[:, node] = CubicSpline(t[known], u[known, node])(np.minimum(grid, t[-1]))
+    note = f"{count} samples at a step of {wanted:.6g}, interpolated ({', '.join(why)})"
+    return grid, made, note
+
+
+def _smooth(u: Array, cut: float, t: Array, recorded_step: float) -> Array:
+    step = float(t[1] - t[0])
+    if not 0.0 < cut < 0.5 / max(step, recorded_step):
+        raise BadInput(
+            f"--lowpass: {cut:g} a unit of time is not between 0 and half the sampling frequency, "
+            f"{0.5 / max(step, recorded_step):g}"
+        )
+    sections = butter(4, 2.0 * cut * step, output="sos")
+    return np.asarray(sosfiltfilt(sections, u, axis=0))
+
+
+def _refuse_empty(u: Array, names: Sequence[str]) -> None:
+    empty = np.flatnonzero(np.isnan(u).mean(axis=0) > 0.5)
+    if len(empty):
+        some = ", ".join(names[i] for i in empty[:5].tolist()) + (", ..." * (len(empty) > 5))
+        raise BadInput(
+            f"more than half of the values of node {some} is missing; --order leaves out"
+        )

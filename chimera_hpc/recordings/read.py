@@ -1,0 +1,216 @@
+"""Files of recordings, by the ending of their names.
+
+For developers: a format is a function (path, choice) -> Recording and a line in `READERS`. It
+loads no pickled object, whoever made the file.
+"""
+
+from __future__ import annotations
+
+import warnings
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.recordings.recording import Choice, Recording, as_signals, as_times, turned
+from chimera_hpc.recordings.tables import read_table
+
+_TIMES = ("t", "time", "times")
+_SIGNALS = ("u", "x", "y", "data", "signal", "signals")
+_ZARR = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
+
+
+def read_recording(path: Path, choice: Choice) -> Recording:
+    """Read a time series, time by node.
+
+    Parameters
+    ----------
+    path : Path
+        .npz, .npy, .csv (.tsv, .txt, .dat), .nc (NetCDF), or the folder of a Zarr store.
+    choice : Choice
+
+    Raises
+    ------
+    BadInput
+        No such file, another format, a file with pickled objects, or one that leaves open what the
+        signals or the times are.
+    """
+    if (path / "store.zarr").is_dir():
+        path = path / "store.zarr"
+    reader = READERS.get(path.suffix.lower())
+    if path.is_dir():
+        if not any((path / name).is_file() for name in _ZARR):
+            raise BadInput(f"{path}: a folder that is no Zarr store")
+        reader = _read_zarr
+    if not path.exists():
+        raise BadInput(f"{path}: no such file")
+    if reader is None:
+        known = ", ".join(READERS)
+        raise BadInput(f"{path}: allowed are {known} and Zarr stores")
+    try:
+        return turned(reader(path, choice), choice)
+    except BadInput as error:
+        raise BadInput(f"{path}: {error}") from None
+    except (OSError, EOFError, UnicodeDecodeError, zipfile.BadZipFile) as error:
+        raise BadInput(f"{path}: can't be read: {_line(error)}") from None
+
+
+def _read_npy(path: Path, choice: Choice) -> Recording:
+    return Recording(None, as_signals("array", _load(path)))
+
+
+def _read_npz(path: Path, choice: Choice) -> Recording:
+    with _load(path) as archive:
+        shapes = {name: archive[name] for name in _names(archive)}
+    signals = {name: array for name, array in shapes.items() if array.ndim == 2}
+    name = _choose("array", choice.variable, signals, list(shapes))
+    time = choice.time
+    if time is None:
+        time = next((key for key in shapes if key.lower() in _TIMES and key != name), None)
+    elif time not in shapes:
+        raise BadInput(f"--time {time}: the file has {', '.join(shapes)}")
+    notes = [f"signals: array {name}"] + ([f"times: array {time}"] if time else [])
+    t = None if time is None or choice.no_times else as_times(time, shapes[time])
+    return Recording(t, as_signals(name, shapes[name]), (), tuple(notes))
+
+
+def _names(archive: Any) -> list[str]:
+    """Return the names of an archive's arrays; BadInput when one holds objects."""
+    try:
+        return [name for name in archive.files if archive[name] is not None]
+    except ValueError as error:
+        raise _pickled(error) from None
+
+
+def _load(path: Path) -> Any:
+    with path.open("rb") as file:
+        begin = file.read(6)
+    if not begin.startswith((b"\x93NUMPY", b"PK")):
+        raise BadInput("is no file of NumPy arrays; pickled objects are not read")
+    try:
+        return np.load(path, allow_pickle=False)
+    except ValueError as error:
+        raise _pickled(error) from None
+
+
+def _pickled(error: Exception) -> BadInput:
+    if "pickle" in str(error):
+        return BadInput("holds pickled objects, which can run any program: they are not read")
+    return BadInput(f"can't be read: {_line(error)}")
+
+
+def _read_netcdf(path: Path, choice: Choice) -> Recording:
+    import xarray as xr
+
+    try:
+        with _quiet(), xr.open_dataset(path) as dataset:
+            return _labelled(dataset, choice)
+    except BadInput:
+        raise
+    except (ValueError, TypeError, ImportError) as error:
+        if "engine" in str(error) or "backend" in str(error):
+            needs = "is NetCDF 4 (or no NetCDF); that needs the package netCDF4 or h5netcdf"
+            raise BadInput(needs) from None
+        raise BadInput(f"can't be read: {_line(error)}") from None
+
+
+def _read_zarr(path: Path, choice: Choice) -> Recording:
+    import xarray as xr
+
+    try:
+        with _quiet(), xr.open_zarr(path, chunks=None) as dataset:
+            return _labelled(dataset, choice)
+    except BadInput:
+        raise
+    except (ValueError, KeyError, TypeError, FileNotFoundError) as error:
+        raise BadInput(
+            f"can't be read as a group of arrays with named dimensions: {_line(error)}"
+        ) from None
+
+
+def _labelled(dataset: Any, choice: Choice) -> Recording:
+    """Return the recording in an xarray Dataset."""
+    chosen = dict(choice.select)
+    for name, index in chosen.items():
+        size = dataset.sizes.get(name)
+        if size is None or not -size <= index < size:
+            sizes = ", ".join(f"{key} ({n})" for key, n in dataset.sizes.items())
+            raise BadInput(f"--select {name}={index}: its dimensions are {sizes}")
+    variables = {str(name): dataset[name] for name in dataset.data_vars}
+    usable = {
+        name: array
+        for name, array in variables.items()
+        if len(set(array.dims) - set(chosen)) == 2 and array.dtype.kind in "iuf"
+    }
+    name = _choose("variable", choice.variable, usable, list(variables))
+    array = variables[name].isel({k: i for k, i in chosen.items() if k in variables[name].dims})
+    if array.ndim != 2:
+        sizes = ", ".join(f"{key} ({n})" for key, n in array.sizes.items())
+        raise BadInput(f"{name} has the dimensions {sizes}; --select NAME=INDEX until two are left")
+    dims = [str(dim) for dim in array.dims]
+    time = _time_dimension(array, dims, choice)
+    (node,) = [dim for dim in dims if dim != time]
+    u = as_signals(name, array.transpose(time, node).values)
+    t = None
+    if time in array.coords and not choice.no_times:
+        t = as_times(time, array.coords[time].values)
+    names = tuple(map(str, array.coords[node].values)) if node in array.coords else ()
+    notes = [f"signals: variable {name}", f"times: {time}, nodes: {node}"]
+    if t is not None and array.coords[time].dtype.kind in "mM":
+        notes.append("dates were taken for seconds since the first")
+    return Recording(t, u, names, tuple(notes))
+
+
+def _time_dimension(array: Any, dims: list[str], choice: Choice) -> str:
+    if choice.time is not None:
+        if choice.time not in dims:
+            raise BadInput(f"--time {choice.time}: the dimensions are {', '.join(dims)}")
+        return choice.time
+    named = [dim for dim in dims if dim.lower() in _TIMES]
+    dated = [d for d in dims if d in array.coords and array.coords[d].dtype.kind in "mM"]
+    found = named or dated
+    if len(found) != 1:
+        raise BadInput(f"which of {', '.join(dims)} is time? --time NAME says it")
+    return found[0]
+
+
+def _choose(kind: str, asked: str | None, usable: Mapping[str, Any], known: list[str]) -> str:
+    """Return the name of the array of signals."""
+    if asked is not None:
+        if asked not in known:
+            raise BadInput(f"--variable {asked}: the file has {', '.join(known) or 'nothing'}")
+        return asked
+    if len(usable) == 1:
+        return next(iter(usable))
+    named = [name for name in usable if name.lower() in _SIGNALS]
+    if len(named) == 1:
+        return named[0]
+    if not usable:
+        many = ", ".join(known) or "nothing"
+        hint = "; --variable NAME and --select DIMENSION=INDEX choose" if known else ""
+        raise BadInput(f"no {kind} of times by nodes; the file has {many}{hint}")
+    raise BadInput(f"which {kind}: {', '.join(usable)}? --variable NAME says it")
+
+
+def _quiet() -> Any:
+    """Keep the remarks of the libraries on how a file is made away from the user."""
+    return warnings.catch_warnings(action="ignore")
+
+
+def _line(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return text if len(text) <= 200 else text[:197] + "..."
+
+
+READERS: dict[str, Callable[[Path, Choice], Recording]] = {
+    ".npz": _read_npz,
+    ".npy": _read_npy,
+    ".csv": read_table,
+    ".tsv": read_table,
+    ".txt": read_table,
+    ".dat": read_table,
+    ".nc": _read_netcdf,
+}

@@ -1,0 +1,236 @@
+"""One run a cell to look at: a small space-time picture and the profiles of its features."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from chimera_hpc.errors import BadInput
+from chimera_hpc.grid.tables import Keep
+from chimera_hpc.layout import FEATURES, sample_times, series_mask
+from chimera_hpc.reduce.modes import vote_labels
+from chimera_hpc.report.content import Content
+from chimera_hpc.status import Status
+
+Array = NDArray[np.float64]
+
+MOST_CELLS = 600
+MOST_BYTES = 5_500_000
+"""Cells with a picture and profiles, and what these may take of the page in all."""
+MOST_SECONDS = 20.0
+"""Work on replaying runs whose series the store does not keep."""
+_PERIODS = 8.0
+_COLUMNS, _ROWS = 240, 128
+"""Most samples of a picture along time and along the ring."""
+_COLOURS = 64
+_PROFILES = ("amplitude", "phase", "frequency")
+_BATCH = 16
+"""Runs that are replayed in one go."""
+
+
+@dataclass(frozen=True)
+class Plates:
+    """What cells carry beside their numbers."""
+
+    by_cell: dict[int, dict[str, Any]]
+    """Plain values for JSON by the number of the cell; the key `image` may be missing."""
+    n_eligible: int
+    """Cells with a run that has a result."""
+    n_images: int
+    most_cells: int
+    replay: bool
+    """Whether runs were replayed whose series the store does not keep."""
+
+    @property
+    def sentence(self) -> str:
+        """How many cells carry what, and why not more."""
+        n, profiles = self.n_eligible, len(self.by_cell)
+        if self.n_images == profiles == n:
+            return f"All {n} cells with results carry a picture and profiles."
+        limit = f"for at most {MOST_SECONDS:g} s" if self.replay else "at the end of the run only"
+        return (
+            f"{self.n_images} of {n} cells with results carry a picture, "
+            f"{'all' if profiles == n else profiles} carry profiles: at most {self.most_cells} "
+            f"cells and {MOST_BYTES / 1e6:g} MB, spread evenly. Series that the store does not "
+            f"keep are replayed {limit}; the command show replays any run."
+        )
+
+
+def plates(
+    content: Content,
+    shown: NDArray[np.int64],
+    most_cells: int = MOST_CELLS,
+    replay: bool = True,
+) -> Plates:
+    """Make the pictures and profiles of one run a cell, as far as their budget goes.
+
+    The run is one of the cell's modal class, one whose series is kept where there is such a run.
+    `shown` are the cells to choose from.
+    """
+    chosen = representatives(content)
+    cells = shown[chosen[shown] >= 0]
+    spread = cells[evenly_spread(len(cells))][:most_cells].tolist()
+    kept = series_mask(content.store.sweep, content.store.points.columns["seed"])
+    stored = [i for i in spread if kept[chosen[i]]]
+    others = [i for i in spread if not kept[chosen[i]]]
+    others = others[: affordable(content) if replay else 0]
+    pictured = [*stored, *others]
+    plain = [i for i in spread if i not in set(pictured)]
+    series = _all_series(content, [int(chosen[i]) for i in pictured])
+    profiles = _profiles_of(content, chosen[spread])
+    made: dict[int, dict[str, Any]] = {}
+    size = 0
+    for k, i in enumerate((*pictured, *plain)):
+        plate = _plate(content, int(chosen[i]), profiles[int(chosen[i])])
+        if k < len(pictured):
+            plate |= _picture(*next(series), profiles[int(chosen[i])])
+        size += len(json.dumps(plate))
+        if size > MOST_BYTES:
+            break
+        made[i] = plate
+    images = sum("image" in plate for plate in made.values())
+    return Plates(made, int((chosen >= 0).sum()), images, most_cells, replay)
+
+
+def representatives(content: Content) -> NDArray[np.int64]:
+    """Return for each cell the point that stands for it, -1 where none has a result.
+
+    A run of the modal class comes before others, a run whose series is kept before others, the
+    first before later ones.
+    """
+    cut = content.cuts[content.first_cut]
+    label = vote_labels(cut.labels, content.status, len(cut.names))
+    typical = label == content.votes(cut).modal[content.cell]
+    kept = series_mask(content.store.sweep, content.store.points.columns["seed"])
+    with_result = np.flatnonzero(label >= 0)
+    # With a stable sort the best of each cell comes first.
+    order = np.lexsort((~kept[with_result], ~typical[with_result], content.cell[with_result]))
+    best = with_result[order]
+    found, first = np.unique(content.cell[best], return_index=True)
+    chosen = np.full(content.n_cells, -1, dtype=np.int64)
+    chosen[found] = best[first]
+    return chosen
+
+
+def evenly_spread(n: int) -> NDArray[np.int64]:
+    """Return 0..n-1 in an order of which every first part is spread evenly: by reversed bits."""
+    bits = max(1, math.ceil(math.log2(max(n, 2))))
+    numbers = np.arange(n)
+    reverse = np.zeros(n, dtype=np.int64)
+    for bit in range(bits):
+        reverse |= ((numbers >> bit) & 1) << (bits - 1 - bit)
+    return np.argsort(reverse)
+
+
+def affordable(content: Content) -> int:
+    """Return how many runs may be replayed, by the time that the runs in the store took."""
+    ran = content.status != Status.NEVER
+    if not ran.any():
+        return 0
+    seconds = float(content.scan.columns["elapsed_us"][ran].mean()) / 1e6
+    return int(MOST_SECONDS / max(seconds, 1e-6))
+
+
+def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array, Array]]:
+    """Yield (t, u) of points, read or replayed; in the order given."""
+    store, t = content.store, sample_times(content.store.sweep)
+    kept = series_mask(store.sweep, store.points.columns["seed"])
+    for start in range(0, len(points), _BATCH):
+        batch = np.array(points[start : start + _BATCH], dtype=np.int64)
+        missing = batch[~kept[batch]]
+        replayed = dict(zip(missing.tolist(), _replay(content, missing), strict=True))
+        for i in batch.tolist():
+            yield t, replayed[i] if i in replayed else store.series(i)
+
+
+def _replay(content: Content, points: NDArray[np.int64]) -> Array:
+    """Compute the series (n, T, N) of points anew."""
+    if not len(points):
+        return np.empty((0, 0, 0))
+    from chimera_hpc.task import run_block
+
+    sweep = content.store.sweep
+    sweep = sweep.model_copy(update={"keep": Keep(series="all", dtype="float32")})
+    series = run_block(sweep, content.store.points[points]).series
+    if series is None:
+        raise BadInput(f"{content.store.path}: the model gives no series to draw")
+    return np.asarray(series, dtype=np.float64)
+
+
+def _profiles_of(content: Content, points: NDArray[np.int64]) -> dict[int, Array | None]:
+    """Return the features (8, N) of points, read block by block; None where they are no numbers."""
+    size, found = content.store.block_size, {}
+    block, table = -1, np.empty(0)
+    for i in sorted(points.tolist()):
+        if i // size != block:
+            block = i // size
+            table = content.store.files.read("features", block)
+        row = np.array(table[i % size], dtype=np.float64)
+        found[i] = row if np.isfinite(row[: len(_PROFILES)]).all() else None
+    return found
+
+
+def _plate(content: Content, i: int, features: Array | None) -> dict[str, Any]:
+    plate: dict[str, Any] = {
+        "point": content.point_words(i),
+        "seed": int(content.store.points.columns["seed"][i]),
+        "status": Status(int(content.status[i])).sentence,
+        "classes": {str(k): int(cut.labels[i]) for k, cut in content.cuts.items()},
+    }
+    if np.isfinite(content.triplets[i]).all():
+        plate["variations"] = [rounded(v) for v in content.triplets[i].tolist()]
+    if features is not None:
+        rows = dict(zip(FEATURES, features.tolist(), strict=True))
+        for name in _PROFILES:
+            plate[name] = [rounded(v) for v in rows[name]]
+            plate[f"{name}_std"] = [rounded(v) for v in rows[f"{name}_std"]]
+    return plate
+
+
+def _picture(t: Array, u: Array, features: Array | None) -> dict[str, Any]:
+    """Return the last periods of a run as a PNG with its corners in time and its colour range."""
+    duration = t[-1] - t[0]
+    if features is not None:
+        rate = float(np.median(features[FEATURES.index("frequency")]))
+        duration = min(duration, _PERIODS / max(rate, 1e-12))
+    first = int(np.searchsorted(t, t[-1] - duration))
+    columns = np.linspace(first, len(t) - 1, min(_COLUMNS, len(t) - first)).round().astype(int)
+    nodes = np.linspace(0, u.shape[1] - 1, min(_ROWS, u.shape[1])).round().astype(int)
+    part = u[np.ix_(columns, nodes)]
+    largest = float(np.nanmax(np.abs(u), initial=0.0)) or 1.0
+    return {
+        "image": _png(part.T[::-1] / largest),
+        "t": [rounded(float(t[first]), 6), rounded(float(t[-1]), 6)],
+        "largest": rounded(largest, 3),
+    }
+
+
+def _png(values: Array) -> str:
+    """Return an image of values from -1 to 1 as a data URI."""
+    steps = np.clip((np.nan_to_num(values) + 1.0) / 2.0 * _COLOURS, 0, _COLOURS - 1)
+    image = Image.fromarray(steps.astype(np.uint8))
+    image.putpalette(palette().tobytes())
+    file = io.BytesIO()
+    image.save(file, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
+
+
+def palette() -> NDArray[np.uint8]:
+    """Return the colours of the pictures, (n, 3)."""
+    colours = mpl.colormaps["viridis"](np.linspace(0.0, 1.0, _COLOURS))[:, :3]
+    return np.asarray(255 * colours).round().astype(np.uint8)
+
+
+def rounded(value: float, digits: int = 4) -> float | None:
+    """Return a number with so many significant digits, None for NaN and infinity."""
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else None

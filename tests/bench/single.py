@@ -1,0 +1,314 @@
+"""One process, one core: ours against the peers, and the stepping loop against the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import peers
+from measure import Timing, interleaved, multiplication_rate
+from numpy.typing import NDArray
+from problems import Ring, error
+from scipy.integrate import solve_ivp
+
+from chimera_hpc import simulate
+from chimera_hpc.integrate.driver import Control, Outcome, integrate
+from chimera_hpc.models.networked_fhn import NetworkedFHN
+from chimera_hpc.models.topological_fhn import TopologicalFHN
+
+Array = NDArray[np.float64]
+
+RTOL = 1e-6
+LOOSER = (1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3)
+HORIZON = 20.0
+"""Errors are looked at up to here: later, chaos has made everything of them."""
+SEEDS = 16
+FLOPS_PER_NODE = 180
+"""Floating-point operations of a step, counted for each node in the reduced form."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table."""
+
+    what: str
+    value: float
+    unit: str
+    target: float
+    at_least: bool = True
+    note: str = ""
+
+    @property
+    def good(self) -> bool:
+        return self.value >= self.target if self.at_least else self.value <= self.target
+
+    def words(self) -> list[str]:
+        sign = "≥" if self.at_least else "≤"
+        held = "yes" if self.good else "**no**"
+        value, target = (f"{x:.3g} {self.unit}".strip() for x in (self.value, self.target))
+        return [self.what, value, f"{sign} {target}", held, self.note]
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured; the small sizes are for the tests."""
+
+    half_degrees: Sequence[int] = (12, 24)
+    t_end: float = 200.0
+    horizon: float = HORIZON
+    repeats: int = 5
+    nodes: Sequence[int] = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 30_000, 100_000)
+    steps: int = 4000
+    with_jax: bool = True
+
+
+def one(ring: Ring, seed: int, rtol: float) -> Array:
+    """Our `simulate`, u as it was sampled."""
+    u, v = ring.initial(seed)
+    run = simulate(
+        ring.topology, u0=u, v0=v, t_end=ring.t_end, t_step=ring.t_step, rtol=rtol, atol=1e-3 * rtol
+    )
+    return run.u
+
+
+def many(ring: Ring, seeds: int, rtol: float) -> None:
+    """Our trajectories of all seeds, eight side by side, u sampled."""
+    model = TopologicalFHN(ring.topology)
+    states = [model.state(*ring.initial(seed)) for seed in range(seeds)]
+    control = Control(ring.t_end, 0.0, ring.t_step, rtol, 1e-3 * rtol)
+    ends: list[int] = []
+
+    def on_end(number: int, outcome: Outcome) -> None:
+        ends.append(outcome.n_sampled)
+
+    integrate([model] * seeds, states, control, ring.n_nodes, on_end)
+    assert len(ends) == seeds
+
+
+def loosest(ring: Ring, limit: float, reference: Array) -> float:
+    """Return our loosest tolerance whose error is not above `limit`."""
+    short = Ring(ring.half_degree, ring.n_nodes, ring.t_step * (len(reference) - 1), ring.t_step)
+    chosen = LOOSER[0]
+    for rtol in LOOSER:
+        if error(one(short, 0, rtol), reference) > limit:
+            return chosen
+        chosen = rtol
+    return chosen
+
+
+def against_peers(sizes: Sizes) -> list[Row]:
+    """Latency of one trajectory and throughput of many, against SciPy and diffrax."""
+    return [
+        row
+        for half_degree in sizes.half_degrees
+        for row in _on_ring(Ring(half_degree, t_end=sizes.t_end), sizes)
+    ]
+
+
+def _on_ring(ring: Ring, sizes: Sizes) -> list[Row]:
+    reference = ring.reference(0, sizes.horizon)
+    rivals: dict[str, Callable[[], Array]] = {
+        "SciPy RK45, full form": lambda: peers.scipy_full(ring, 0, RTOL),
+        "SciPy RK45, reduced form": lambda: peers.scipy_reduced(ring, 0, RTOL),
+    }
+    batches: dict[str, Callable[[], Array]] = {}
+    if sizes.with_jax:
+        for form in ("full", "reduced"):
+            solver, name = peers.diffrax(ring, form, RTOL), f"diffrax Tsit5, {form} form"
+            rivals[name] = _first(solver, peers.states(ring, form, range(1)))
+            batches[name] = _all(solver, peers.states(ring, form, range(SEEDS)))
+    errors = {name: error(run(), reference) for name, run in rivals.items()}
+    errors["ours"] = error(one(ring, 0, RTOL), reference)
+    limits = {name: loosest(ring, found, reference) for name, found in errors.items()}
+    runs: dict[str, Callable[[], object]] = dict(rivals)
+    runs |= {f"{name}, together": run for name, run in batches.items()}
+    for rtol in {RTOL, *limits.values()}:
+        runs[f"ours at {rtol:g}"] = partial(one, ring, 0, rtol)
+        runs[f"lanes at {rtol:g}"] = partial(many, ring, SEEDS, rtol)
+    return _compare(ring.half_degree, interleaved(runs, sizes.repeats), errors, limits)
+
+
+def _first(solver: Callable[[Array], Array], states: Array) -> Callable[[], Array]:
+    return lambda: solver(states)[0]
+
+
+def _all(solver: Callable[[Array], Array], states: Array) -> Callable[[], Array]:
+    return lambda: solver(states)
+
+
+_TARGETS = {
+    "SciPy RK45, full form": (100.0, 150.0),
+    "diffrax Tsit5, full form": (None, 25.0),
+    "diffrax Tsit5, reduced form": (None, 6.0),
+}
+
+
+def _compare(
+    half_degree: int, times: dict[str, Timing], errors: dict[str, float], limits: dict[str, float]
+) -> list[Row]:
+    rows = []
+    for name, (latency, throughput) in _TARGETS.items():
+        if name not in times:
+            continue
+        rtol, alone = limits[name], times[name].median
+        note = f"{alone:.3g} s and error {errors[name]:.1e}; ours {{:.3g}} s at rtol {rtol:g}"
+        note += f"; at rtol {RTOL:g} (error {errors['ours']:.1e}) {{:.3g}} times"
+        if latency is not None:
+            equal = times[f"ours at {rtol:g}"].median
+            same = alone / times[f"ours at {RTOL:g}"].median
+            what = f"one trajectory, P = {half_degree}, against {name}"
+            text = note.format(equal, same)
+            rows.append(Row(what, alone / equal, "times", latency, True, text))
+        together = times.get(f"{name}, together")
+        best = min(alone, together.median / SEEDS) if together else alone
+        equal = times[f"lanes at {rtol:g}"].median / SEEDS
+        same = best / (times[f"lanes at {RTOL:g}"].median / SEEDS)
+        what = f"{SEEDS} trajectories, P = {half_degree}, against {name}"
+        text = note.replace(f"{alone:.3g} s", f"{best:.3g} s a trajectory", 1).format(equal, same)
+        rows.append(Row(what, best / equal, "times", throughput, True, text))
+    return rows
+
+
+def lane_step(
+    n_nodes: int, half_degree: int, repeats: int, steps: int, t_end: float = 1000.0
+) -> tuple[float, float]:
+    """Return seconds a lane-step and the lane-steps tried in all, eight trajectories at once."""
+    ring = Ring(half_degree, n_nodes)
+    model = TopologicalFHN(ring.topology)
+    states = [model.state(*ring.initial(seed)) for seed in range(8)]
+    control = Control(t_end, t_end, 0.01, max_steps=steps)
+    taken: list[int] = []
+
+    def run() -> None:
+        taken.clear()
+        integrate([model] * 8, states, control, 1, lambda _, end: taken.append(end.steps), lanes=8)
+
+    seconds = interleaved({"": run}, repeats)[""].median
+    # All lanes try `steps` steps, unless they reach the end before.
+    return seconds / sum(taken), float(sum(taken))
+
+
+def stepping(sizes: Sizes) -> tuple[list[Row], list[tuple[int, float]]]:
+    """Cost of a step: against dgemm, for two coupling ranges, for ever larger rings."""
+    dgemm = multiplication_rate()
+    long = 10 * sizes.steps
+    costs = {half: lane_step(50, half, sizes.repeats, long)[0] for half in (3, 24, 12)}
+    share = FLOPS_PER_NODE * 50 / costs[12] / dgemm
+    note = f"{1e6 * costs[12]:.3f} us a lane-step; dgemm {dgemm / 1e9:.1f} GFlop/s"
+    rows = [Row("useful work of the stepping loop, of dgemm's rate", share, "", 0.25, True, note)]
+    note = ", ".join(f"P = {half}: {1e6 * cost:.3f} us" for half, cost in sorted(costs.items()))
+    ratio = costs[24] / costs[3]
+    rows.append(Row("a step at P = 24 over one at P = 3", ratio, "", 1.1, False, note))
+    curve = []
+    for n in sizes.nodes:
+        steps = max(sizes.steps * 50 // n, 20)
+        curve.append((n, lane_step(n, 12, sizes.repeats, steps)[0] / n))
+    per_node = np.array([cost for _, cost in curve])
+    # Caches make steps: within each of them the cost of a node should be level.
+    note = ", ".join(f"{n}: {1e9 * cost:.2f} ns" for n, cost in curve)
+    rows.append(
+        Row(
+            "cost of a node and step, dearest ring over the one of 50",
+            float(per_node.max() / per_node[0]),
+            "",
+            1.15,
+            False,
+            note,
+        )
+    )
+    return rows, curve
+
+
+def features(sizes: Sizes) -> list[Row]:
+    """What is measured of a trajectory, against its integration in lanes."""
+    from chimera_hpc.grid import Sweep
+    from chimera_hpc.task import run_block
+
+    text = 'name = "x"\nmodel = "topological_fhn"\n[grid]\nP = 12\nQ = "P"\nseeds = 16\n'
+    text += f"[integrator]\nt_end = {1000.0 if sizes.steps > 1000 else 60.0}\n"
+    text += f"[features]\nstart = {950.0 if sizes.steps > 1000 else 10.0}\n"
+    sweep = Sweep.from_toml_text(text)
+    points = sweep.points()
+    spent = {}
+
+    def whole() -> None:
+        run_block(sweep, points)
+
+    spent["whole"] = interleaved({"": whole}, sizes.repeats)[""].median
+    spent["measured"] = _measuring_time(sweep, points)
+    share = spent["measured"] / (spent["whole"] - spent["measured"])
+    each = {name: 1e3 * seconds / len(points) for name, seconds in spent.items()}
+    note = f"{each['measured']:.2f} ms of {each['whole']:.2f} ms a trajectory"
+    return [Row("features over integration, 50 nodes, P = 12", share, "", 0.25, False, note)]
+
+
+def _measuring_time(sweep: Any, points: Any) -> float:
+    """Return the seconds that `task` spends between the end of a run and its result."""
+    import time
+
+    from chimera_hpc import task
+
+    block: Any = task._Block
+    measure, spent = block.measure, []
+
+    def timed(self: Any, row: int, outcome: Outcome) -> None:
+        began = time.perf_counter()
+        measure(self, row, outcome)
+        spent.append(time.perf_counter() - began)
+
+    block.measure = timed
+    try:
+        task.run_block(sweep, points)
+    finally:
+        block.measure = measure
+    return sum(spent)
+
+
+def networked(sizes: Sizes) -> list[Row]:
+    """The classical networked model: one trajectory and many, against SciPy."""
+    n, half = 500, 165
+    model = NetworkedFHN(n, half, 0.3)
+    rng = np.random.default_rng(0)
+    t_end = min(20.0, sizes.t_end / 10)
+    times = 0.01 * np.arange(round(t_end / 0.01) + 1)
+    states = [rng.uniform(-1, 1, 2 * n) for _ in range(SEEDS)]
+    arguments = (n, half, model.sigma, model.epsilon, model.b, model.phi)
+
+    def rival(rtol: float = RTOL, method: str = "RK45") -> Array:
+        span, state = (0.0, times[-1]), states[0]
+        options = {"rtol": rtol, "atol": 1e-3 * rtol}
+        slope = peers.networked_slope
+        done = solve_ivp(slope, span, state, method, times, args=arguments, **options)
+        return np.asarray(done.y[:n].T)
+
+    def ours(rtol: float = RTOL) -> Array:
+        first = states[0]
+        options = {"rtol": rtol, "atol": 1e-3 * rtol}
+        return simulate(model, u0=first[:n], v0=first[n:], t_end=t_end, t_step=0.01, **options).u
+
+    def lanes(rtol: float = RTOL) -> None:
+        control = Control(t_end, 0.0, 0.01, rtol, 1e-3 * rtol)
+        integrate([model] * SEEDS, states, control, n, lambda *_: None, lanes=8)
+
+    reference = rival(1e-12, "DOP853")[times <= 5.0]
+    limit, rtol = error(rival(), reference), LOOSER[0]
+    for looser in LOOSER:
+        if error(ours(looser), reference) > limit:
+            break
+        rtol = looser
+    found = interleaved(
+        {"SciPy": rival, "one": lambda: ours(rtol), "lanes": lambda: lanes(rtol), "same": ours},
+        sizes.repeats,
+    )
+    seconds = found["SciPy"].median
+    each = found["lanes"].median / SEEDS
+    note = f"SciPy {seconds:.3g} s and error {limit:.1e}, ours {each:.3g} s at rtol {rtol:g}; one "
+    note += f"alone {seconds / found['one'].median:.3g} times, at rtol {RTOL:g} "
+    note += f"{seconds / found['same'].median:.3g} times"
+    return [
+        Row("networked model, N0 = 500, P = 165, 16 trajectories, against SciPy RK45",
+            seconds / each, "times", 20.0, True, note)
+    ]  # fmt: skip

@@ -1,0 +1,67 @@
+"""Every part of ``scripts/bench`` runs at its smallest size; no time is judged here."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).parent
+ROOT = FOLDER.parents[1]
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch):
+    """A module of the benchmark by its name."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    return importlib.import_module
+
+
+@pytest.mark.slow
+def test_every_part_runs_and_leaves_a_page(tmp_path):
+    (tmp_path / "images").mkdir()
+    out = tmp_path / "rows.json"
+    words = ["--tiny", "--write", "--docs", str(tmp_path), "--json", str(out)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(FOLDER / "__main__.py"), *words, "--folder", str(tmp_path)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(out.read_text())
+    assert len(rows) == 17
+    assert all(np.isfinite(row["value"]) for row in rows)
+    assert "10 million points" in (tmp_path / "performance.md").read_text()
+    assert (tmp_path / "images" / "performance.png").stat().st_size > 10_000
+
+
+def test_peers_solve_the_same_problem(bench):
+    problems, peers, single = map(bench, ("problems", "peers", "single"))
+    ring = problems.Ring(4, t_end=3.0)
+    reference = ring.reference(0, 3.0)
+    for u in (
+        peers.scipy_full(ring, 0, 1e-8),
+        peers.scipy_reduced(ring, 0, 1e-8),
+        single.one(ring, 0, 1e-8),
+    ):
+        assert problems.error(u, reference) < 1e-5
+
+
+def test_a_projection_without_costs_is_ideal(bench):
+    projection = bench("projection")
+    costs = projection.Costs(0.02, 0.0, 0.0, 0.0)
+    found = projection.forecast(costs, 10, 3_000, 1, scheduler=True, spread=0.0)
+    assert found.hours * 3600 == pytest.approx(0.02 * 300)
+    assert found.efficiency == pytest.approx(1.0)
+
+
+def test_a_scheduler_too_slow_for_its_cores_sets_the_pace(bench):
+    projection = bench("projection")
+    costs = projection.Costs(0.001, 0.0, 0.01, 0.0)
+    found = projection.forecast(costs, 100, 1_000, 1, scheduler=True, spread=0.0)
+    assert found.hours * 3600 == pytest.approx(10.0, rel=0.01)
+    assert found.scheduler_load > 0.99

@@ -1,0 +1,65 @@
+"""The makers of Dask clusters: nothing given up too early, nothing waited for without end."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import dask
+import pytest
+from dask.utils import parse_timedelta
+
+from chimera_hpc import cluster
+from chimera_hpc.cluster import local_cluster, settings
+
+
+def test_worker_that_is_slow_to_come_back_is_not_given_up() -> None:
+    # Dask's own 15 s are over soon on a busy machine; then it ends the nanny and its new worker.
+    assert parse_timedelta(settings()["distributed.deploy.lost-worker-timeout"]) > 24 * 3600
+
+
+class Stuck:
+    """A cluster that does not close."""
+
+    def __init__(self, pid: int, *given: Any, **options: Any) -> None:
+        self.nanny = SimpleNamespace(auto_restart=True, process=SimpleNamespace(pid=pid))
+        self.workers = {0: self.nanny}
+        self.limits: list[float] = []
+
+    def close(self, timeout: float) -> None:
+        self.limits.append(timeout)
+        raise TimeoutError
+
+
+def test_cluster_that_does_not_close_is_left_behind_without_workers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as worker:
+        stuck = Stuck(worker.pid)
+        monkeypatch.setattr("distributed.LocalCluster", lambda **options: stuck)
+        monkeypatch.setattr("distributed.Client", FakeClient)
+        with local_cluster(1) as client:
+            assert isinstance(client, FakeClient)
+            assert dask.config.get("distributed.scheduler.work-stealing") is False
+        assert worker.wait(timeout=30) == -signal.SIGKILL
+    assert stuck.limits == [cluster._CLOSE_SECONDS]
+    assert stuck.nanny.auto_restart is False
+
+
+class FakeClient:
+    """A client that only takes the plugin."""
+
+    def __init__(self, cluster: Any) -> None:
+        self.plugins: list[Any] = []
+
+    def __enter__(self) -> FakeClient:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def register_plugin(self, plugin: Any) -> None:
+        self.plugins.append(plugin)
