@@ -22,7 +22,7 @@ from chimera_hpc.features import (
     range_of,
     sigma,
 )
-from chimera_hpc.features.series import quantise
+from chimera_hpc.features.series import by_node, quantise
 from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.integrate.driver import Control, Outcome, Stopped, integrate
 from chimera_hpc.integrate.simd import LANES
@@ -215,8 +215,7 @@ class _Block:
             self.on_signals(row, *model.node_pair(outcome.samples))
         if outcome.status is not Status.DONE:
             return
-        # NumPy's sums depend on the layout, and a lone lane's samples lie across.
-        u, w = model.node_pair(np.ascontiguousarray(outcome.samples))
+        u, w = model.node_pair(by_node(outcome.samples))
         u = rounded(u, self.sweep.keep.dtype)
         features = self.features(u)
         result.status[row] = features.status
@@ -291,4 +290,4 @@ def warm_up(sweep: Sweep, points: Points) -> None:
     fourier_features(t, rows.T, clock=spec.clock, refine=spec.refine)
     order_parameter(rows.T, rows.T)
     local_sigma(rows.T, 1)
-    quantise(rows, SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))
+    quantise(by_node(rows.T.copy().T), SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))

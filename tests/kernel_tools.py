@@ -105,4 +105,5 @@ def fixed_steps(system, y0, counts, t_end, method, sampling=None):
         pool.iterations = 1
         pool.run()
     assert list(pool.count[K.ACCEPTED]) == list(counts)
-    return pool.y.copy(), pool.samples.copy()
+    samples = np.stack([pool.sampled(lane) for lane in range(LANES)])
+    return pool.y.copy(), samples

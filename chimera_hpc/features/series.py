@@ -1,10 +1,11 @@
-"""Kept series: from the sampled rows of a run to the integers that are stored."""
+"""Series: from the order in which they are sampled to that of the features, and to integers."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.integrate._jit import jit
 
@@ -33,3 +34,22 @@ def quantise(rows: Any, scale: float, missing: int, out: Any) -> None:
                 # Compared before it is an integer: the integer of a NaN is anything.
                 steps = np.rint(rows[i, t] / scale)
                 out[t, i] = int(steps) if abs(steps) <= limit else missing
+
+
+def by_node(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `rows` (n, T) so that each row is contiguous, a tile at a time."""
+    if rows.flags.c_contiguous:
+        return rows
+    out = np.empty(rows.shape)
+    _transpose(rows.T, out)
+    return out
+
+
+@jit()
+def _transpose(samples: Any, out: Any) -> None:
+    n_times, n_rows = samples.shape
+    for first in range(0, n_times, _TILE):
+        last = min(first + _TILE, n_times)
+        for i in range(n_rows):
+            for t in range(first, last):
+                out[i, t] = samples[t, i]

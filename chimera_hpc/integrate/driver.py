@@ -74,8 +74,8 @@ class Control:
 class Outcome:
     """One trajectory's end: status, work done, sampled rows and last state.
 
-    ``samples`` (n_observed, n_samples) is a view of a buffer that is used again: take what is
-    needed before returning; ``n_sampled`` of its columns were reached. ``status`` is DONE or one
+    ``samples`` (n_observed, n_samples) is a view, time by time in memory, of a buffer that is used
+    again: take what is needed before returning; ``n_sampled`` of its columns were reached. ``status`` is DONE or one
     of the integrator's failures.
     """
 
@@ -119,8 +119,7 @@ class Lanes:
         self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
         self.count[K.STATE] = K.IDLE
         self.weights = aligned(method.stages, lanes)
-        shape = (control.n_samples, width) if lanes == 1 else (width, control.n_samples)
-        self.samples = np.zeros((lanes, *shape))
+        self.samples = np.zeros((lanes, control.n_samples, width))
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:
@@ -137,8 +136,8 @@ class Lanes:
 
     def sampled(self, m: int) -> Array:
         """Samples of lane ``m``, shape (n_observed, n_samples)."""
-        samples: Array = self.samples[m]
-        return samples.T[: self.n_observed] if len(self.samples) == 1 else samples
+        samples: Array = self.samples[m, :, : self.n_observed].T
+        return samples
 
     def clear(self, m: int) -> None:
         """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""

@@ -263,33 +263,33 @@ def _sample(
     # continuous extension; the lanes take their first, second, ... sample of the step together.
     lanes = y.shape[1]
     stages, degree = p.shape
-    # One lane's samples are (times, rows), so that packs are written; others' (rows, times).
-    width, total = samples.shape[1:]
-    if lanes == 1:
-        total, width = width, total
+    total, width = samples.shape[1:]
     observed = width // LANES if lanes == 1 else width
     last = units * (stages - 1) - first
     while True:
         due = 0
         for m in range(lanes):
             at = count[NEXT_SAMPLE, m]
-            t = min(start + at * step, t_end)
-            is_due = (
+            count[IS_DUE, m] = (
                 count[STATE, m] == RUNNING
                 and at < total
                 and lane[LOG_ERROR_NEW, m] <= 0.0
-                and t <= lane[TIME_NEW, m]
+                and min(start + at * step, t_end) <= lane[TIME_NEW, m]
             )
-            count[IS_DUE, m] = is_due
-            due += is_due
-            theta = min((t - lane[TIME, m]) / lane[STEP, m], 1.0) if is_due else 0.0
+            due += count[IS_DUE, m]
+        if due == 0:
+            return
+        for m in range(lanes):
+            # Lanes that are not due get the state before the step, which nobody reads.
+            theta = 0.0
+            if count[IS_DUE, m] == 1:
+                t = min(start + count[NEXT_SAMPLE, m] * step, t_end)
+                theta = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
             for j in range(stages):
                 weight = 0.0
                 for d in range(degree - 1, -1, -1):
                     weight = (weight + p[j, d]) * theta
                 weights[j, m] = weight
-        if due == 0:
-            return
         for i in range(observed):
             value = across(like, weights, 0) * load(h, k, first + i)
             for j in range(1, stages - 1):
@@ -305,7 +305,7 @@ def _sample(
                 at = count[NEXT_SAMPLE, m]
                 if lanes > 1:
                     for i in range(width):
-                        samples[m, i, at] = work[i, m]
+                        samples[m, at, i] = work[i, m]
                 count[NEXT_SAMPLE, m] = at + 1
 
 
