@@ -24,6 +24,9 @@ SLICE = 0.1
 FIRST_WORK, FIRST_STEPS = 2_000_000, 64
 # Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
 SAMPLE_BYTES = 96_000_000
+# Bytes of state that a pack may work on: as much as stays in a core's second cache. Beyond, one
+# lane after the other is faster, since it has an eighth of it.
+PACK_BYTES = 1_000_000
 # Fewer trajectories than this go one by one: idle lanes of a pack cost as much as busy ones.
 WORTH_A_PACK = 3
 
@@ -75,8 +78,8 @@ class Outcome:
     """One trajectory's end: status, work done, sampled rows and last state.
 
     ``samples`` (n_observed, n_samples) is a view, time by time in memory, of a buffer that is used
-    again: take what is needed before returning; ``n_sampled`` of its columns were reached. ``status`` is DONE or one
-    of the integrator's failures.
+    again: take what is needed before returning; ``n_sampled`` of its columns were reached.
+    ``status`` is DONE or one of the integrator's failures.
     """
 
     status: Status
@@ -176,9 +179,12 @@ def _in_packs(n: int) -> int:
     return -(-n // LANES) * LANES
 
 
-def choose_lanes(n_trajectories: int, n_observed: int, n_samples: int) -> int:
-    """One lane or a pack, from the number of trajectories and the memory their samples take."""
+def choose_lanes(
+    n_trajectories: int, n_rows: int, stages: int, n_observed: int, n_samples: int
+) -> int:
+    """One lane or a pack, from the number of trajectories and the memory that they take."""
     fits = LANES * n_observed * n_samples * 8 <= SAMPLE_BYTES
+    fits = fits and LANES * (stages + 3) * n_rows * 8 <= PACK_BYTES
     return LANES if n_trajectories >= WORTH_A_PACK and fits else 1
 
 
@@ -219,7 +225,8 @@ def integrate(
     if not systems:
         return
     initial = states if callable(states) else states.__getitem__
-    width = lanes or choose_lanes(len(systems), n_observed, control.n_samples)
+    rows, stages = systems[0].n_rows, METHODS[control.method].stages
+    width = lanes or choose_lanes(len(systems), rows, stages, n_observed, control.n_samples)
     pool = Lanes(width, systems[0], control, n_observed)
     waiting = iter(range(len(systems)))
     holds: list[int | None] = [None] * width

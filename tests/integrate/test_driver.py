@@ -13,6 +13,7 @@ from kernel_tools import System, powers, run_all
 
 from chimera_hpc.integrate import kernel as K
 from chimera_hpc.integrate.driver import (
+    PACK_BYTES,
     SAMPLE_BYTES,
     SLICE,
     Control,
@@ -168,9 +169,11 @@ def test_state_begins_on_a_cache_line(rows, lanes):
 
 
 def test_lanes_follow_the_work_and_the_memory():
-    assert [choose_lanes(n, 50, 5001) for n in (1, 2, 3, 8)] == [1, 1, LANES, LANES]
+    assert [choose_lanes(n, 100, 7, 50, 5001) for n in (1, 2, 3, 8)] == [1, 1, LANES, LANES]
     most = SAMPLE_BYTES // (8 * LANES * 50)
-    assert [choose_lanes(8, 50, n) for n in (most, most + 1)] == [LANES, 1]
+    assert [choose_lanes(8, 100, 7, 50, n) for n in (most, most + 1)] == [LANES, 1]
+    most = PACK_BYTES // (8 * LANES * 10)
+    assert [choose_lanes(8, n, 7, 50, 10) for n in (most, most + 1)] == [LANES, 1]
 
 
 @pytest.mark.parametrize(
