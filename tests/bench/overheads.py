@@ -24,7 +24,7 @@ QUICKSTART = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 
 def measure_costs(folder: Path, n_points: int, tiny: bool) -> Costs:
     """Measure the costs that the projection is fed with."""
-    scale = _scale()
+    scale = scale_program()
     path: Path = scale.plan(folder, "overheads", n_points).path
     worker, scheduler = _dask_costs(scale, folder, path)
     began = time.perf_counter()
@@ -58,7 +58,8 @@ def _dask_costs(scale: ModuleType, folder: Path, path: Path) -> tuple[float, flo
     return sum(spent) / len(spent), (after - before) / len(spent)
 
 
-def _scale() -> ModuleType:
+def scale_program() -> ModuleType:
+    """Return the program behind ``scripts/scale`` as a module."""
     spec = importlib.util.spec_from_file_location("scale_measurements", SCALE)
     assert spec is not None
     assert spec.loader is not None

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+from overheads import scale_program
 from single import Row
 
 ROOT = Path(__file__).parents[2]
@@ -125,14 +126,17 @@ def workers(folder: Path, settings: list[str]) -> list[Row]:
 
 def memory(t_ends: tuple[float, float]) -> list[Row]:
     """Growth of a process that integrates ten times as long."""
+    peak_memory = scale_program().peak_memory
     peaks = []
     for t_end in t_ends:
         settings = ["P=12", "seeds=8", f"integrator.t_end={t_end}", f"features.start={t_end - 50}"]
         command = [sys.executable, "-P", "-c", _BARE, str(ROOT / "jobs" / "quickstart.toml")]
         process = subprocess.Popen([*command, "0", "1", *settings], stdout=subprocess.DEVNULL)
-        _, _, usage = os.wait4(process.pid, 0)
-        process.returncode = 0
-        peaks.append(usage.ru_maxrss * 1024 / MB)
+        peak = 0
+        while process.poll() is None:
+            peak = max(peak, peak_memory(process.pid))
+            time.sleep(0.02)
+        peaks.append(peak / MB)
     note = f"{peaks[0]:.0f} MB and {peaks[1]:.0f} MB; the analysis interval is 50 in both"
     what = f"growth of a worker from t_end {t_ends[0]:g} to {t_ends[1]:g}"
     return [Row(what, peaks[1] - peaks[0], "MB", 20.0, False, note)]

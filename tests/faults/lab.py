@@ -43,6 +43,8 @@ patience = 30.0
 """
 N_POINTS, N_BLOCKS, BLOCK = 32, 8, 4
 PATIENCE = 30.0
+# First and last point of the sweep, and the last one of the sweep before it was extended.
+CHECKED = ((2, 0), (5, 7), (5, 5))
 POINT_SECONDS = 0.03
 _LONGEST = 600.0
 
@@ -229,12 +231,12 @@ class Trial:
     def recomputed(self, broken: tuple[Point, ...], needed: int) -> int:
         """Count how often points were begun beyond what was needed.
 
-        The first point is left out, which each process builds to warm up, and so are those that
-        were made to fail.
+        Points that processes build to check the model and to warm up are left out, and so are those
+        that were made to fail.
         """
         lines = self.log.read_text().splitlines() if self.log.exists() else []
         begun = Counter(tuple(map(int, line.split())) for line in lines)
-        others = {point: n for point, n in begun.items() if point not in {(2, 0), *broken}}
+        others = {point: n for point, n in begun.items() if point not in {*CHECKED, *broken}}
         return sum(n - needed for n in others.values())
 
     def failures_listed(self, text: str) -> set[Point]:

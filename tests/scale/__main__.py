@@ -121,21 +121,36 @@ class Done:
     path: Path = Path()
 
 
+def peak_memory(pid: int) -> int:
+    """Return the most bytes that a process has occupied since it began its program.
+
+    `resource.getrusage` would count the memory of the process that started it, too.
+    """
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0
+    found = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+    return 1024 * found[0] if found else 0
+
+
 def run(*arguments: object) -> Done:
     """Run Python with these arguments, and measure it."""
     began = time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, text=True
     )
+    memory = 0
+    while process.poll() is None:
+        memory = max(memory, peak_memory(process.pid))
+        time.sleep(0.01)
+    seconds = time.perf_counter() - began
     assert process.stdout is not None
     with process.stdout as output:
         text = output.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    seconds = time.perf_counter() - began
     if process.returncode:
         raise SystemExit(f"{arguments} ended with {process.returncode}: {text}")
-    return Done(seconds, usage.ru_maxrss * 1024, text)
+    return Done(seconds, memory, text)
 
 
 def plan(folder: Path, name: str, n_points: int) -> Done:
