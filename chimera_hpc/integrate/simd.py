@@ -119,7 +119,7 @@ if _config.DISABLE_JIT:
         array.reshape(-1)[offset : offset + count] = pack[:count]
 
     def add_shifted(pack: Any, level: int) -> Any:
-        """Do one level of `scan` within a pack."""
+        """Do one level of `SCAN` within a pack."""
         source = np.array(SCAN[level])
         return pack + np.where(source < LANES, pack[source % LANES], -0.0)
 
@@ -254,7 +254,7 @@ else:
 
     @intrinsic(prefer_literal=True)
     def add_shifted(typing_context: Any, pack: Any, level: Any) -> Any:
-        """Do one level of `scan` within a pack."""
+        """Do one level of `SCAN` within a pack."""
         places = SCAN[level.literal_value]
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 import time
 from pathlib import Path
 from types import ModuleType
 
 import psutil
+from programs import SCALE, load_program
 from projection import Costs
 
 from chimera_hpc.execute import run_dask
@@ -18,13 +17,12 @@ from chimera_hpc.store import Store
 from chimera_hpc.task import run_block, warm_up
 from chimera_hpc.work import Orders
 
-SCALE = Path(__file__).parents[1] / "scale" / "__main__.py"
 QUICKSTART = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 
 
 def measure_costs(folder: Path, n_points: int, tiny: bool) -> Costs:
     """Measure the costs that the projection is fed with."""
-    scale = scale_program()
+    scale = load_program(SCALE, "scale_measurements")
     path: Path = scale.plan(folder, "overheads", n_points).path
     worker, scheduler = _dask_costs(scale, folder, path)
     began = time.perf_counter()
@@ -56,14 +54,3 @@ def _dask_costs(scale: ModuleType, folder: Path, path: Path) -> tuple[float, flo
         run_dask(client, Orders(path, 1), blocks, lambda r: spent.append(r.seconds), lambda: False)
         after = sum(process.cpu_times()[:2])
     return sum(spent) / len(spent), (after - before) / len(spent)
-
-
-def scale_program() -> ModuleType:
-    """Return the program behind ``scripts/scale`` as a module."""
-    spec = importlib.util.spec_from_file_location("scale_measurements", SCALE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
-from overheads import scale_program
+from programs import SCALE, load_program
 from single import Row
 
 ROOT = Path(__file__).parents[2]
@@ -126,7 +126,7 @@ def workers(folder: Path, settings: list[str]) -> list[Row]:
 
 def memory(t_ends: tuple[float, float]) -> list[Row]:
     """Growth of a process that integrates ten times as long."""
-    peak_memory = scale_program().peak_memory
+    peak_memory = load_program(SCALE, "scale_measurements").peak_memory
     peaks = []
     for t_end in t_ends:
         settings = ["P=12", "seeds=8", f"integrator.t_end={t_end}", f"features.start={t_end - 50}"]

@@ -28,7 +28,7 @@ def test_every_part_runs_and_leaves_a_page(tmp_path):
     (tmp_path / "images").mkdir()
     out = tmp_path / "rows.json"
     words = ["--tiny", "--write", "--docs", str(tmp_path), "--json", str(out)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "tests")))}
     command = [sys.executable, str(FOLDER / "__main__.py"), *words, "--folder", str(tmp_path)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

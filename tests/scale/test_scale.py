@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from programs import SCALE, load_program
 
 from chimera_hpc import work
 from chimera_hpc.grid import Points, Sweep
@@ -26,14 +25,7 @@ MILLION = 1_000_000
 @pytest.fixture(scope="module")
 def scale() -> ModuleType:
     """The program behind scripts/scale."""
-    path = Path(__file__).parent / "__main__.py"
-    spec = importlib.util.spec_from_file_location("scale_measurements", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_program(SCALE, "scale_measurements")
 
 
 def write_ledger(store: Store) -> None:
