@@ -144,8 +144,10 @@ def rounded(u: Array, dtype: str) -> Array:
     store.
     """
     if dtype == "int16":
-        steps: Array = np.rint(u / SCALE)
-        return steps * SCALE
+        steps: Array = u / SCALE
+        np.rint(steps, out=steps)
+        steps *= SCALE
+        return steps
     return u.astype(dtype).astype(np.float64)
 
 
@@ -162,6 +164,7 @@ class _Block:
         ]
         self.keeps = series_mask(sweep, points.columns["seed"])
         self.result = _empty_result(sweep, n)
+        self.rows = np.empty((0, 0))  # of the run being measured, one after the other
 
     def integrate(
         self,
@@ -215,7 +218,9 @@ class _Block:
             self.on_signals(row, *model.node_pair(outcome.samples))
         if outcome.status is not Status.DONE:
             return
-        u, w = model.node_pair(by_node(outcome.samples))
+        if self.rows.shape != outcome.samples.shape:
+            self.rows = np.empty(outcome.samples.shape)
+        u, w = model.node_pair(by_node(outcome.samples, self.rows))
         u = rounded(u, self.sweep.keep.dtype)
         features = self.features(u)
         result.status[row] = features.status
@@ -253,7 +258,7 @@ class _Block:
             [
                 *total_variations(features),
                 *(sigma(u), sigma(w)),
-                *(float(u.std(axis=0).mean()), range_of(u)),
+                *(features.deviation, range_of(u)),
                 *(order_parameter(u, w), self.distance(row, y_end)),
                 *local_sigma(u, self.sweep.features.groups),
             ]
@@ -290,4 +295,4 @@ def warm_up(sweep: Sweep, points: Points) -> None:
     fourier_features(t, rows.T, clock=spec.clock, refine=spec.refine)
     order_parameter(rows.T, rows.T)
     local_sigma(rows.T, 1)
-    quantise(by_node(rows.T.copy().T), SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))
+    quantise(by_node(rows.T.copy().T, rows), SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))

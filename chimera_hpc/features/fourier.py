@@ -58,6 +58,7 @@ class FourierFeatures:
     phase_std: Array  # rad
     baseline_std: Array
     n_windows: int  # of each signal; with each signal's own clock, the least over the signals
+    deviation: float  # mean over the signals of the standard deviation in time
     status: Status  # DONE, STEADY or NO_WINDOW
 
     def as_array(self) -> Array:
@@ -71,8 +72,8 @@ class WindowLines:
 
     `amplitude`, `frequency`, `phase` and `baseline` have shape (N, q); `first` and `last` (samples,
     both inside the window) and `counts` have one row a clock: 1 for the ring's clock, N for each
-    signal's own. Beyond a clock's count, values are NaN and samples 0. All are empty unless
-    `status` is DONE.
+    signal's own. Beyond a clock's count, values are NaN and samples 0. All but
+    `deviation` are empty unless `status` is DONE.
     """
 
     amplitude: Array
@@ -82,6 +83,7 @@ class WindowLines:
     first: windows.Samples
     last: windows.Samples
     counts: windows.Samples
+    deviation: float  # mean over the signals of the standard deviation in time
     status: Status
 
 
@@ -187,7 +189,9 @@ def fourier_features(
         values = np.stack([getattr(found, name) for name in QUANTITIES])
         _average(values, found.counts, phase_mean == "circular", out)
     rows = dict(zip(FEATURES, out, strict=True))
-    return FourierFeatures(**rows, n_windows=n_windows, status=found.status)
+    return FourierFeatures(
+        **rows, n_windows=n_windows, deviation=found.deviation, status=found.status
+    )
 
 
 def window_lines(
@@ -212,12 +216,13 @@ def window_lines(
     _check_choice("time_origin", time_origin, get_args(TimeOrigin))
     _check_still(still)
 
-    if _mean_deviation(recording.x) < still:
-        return _no_lines(n_nodes, Status.STEADY)
+    deviation = _mean_deviation(recording.x)
+    if deviation < still:
+        return _no_lines(n_nodes, deviation, Status.STEADY)
     clocks = recording.x if clock == "own" else recording.x[clock_node : clock_node + 1]
     first, last, counts = _place_windows(clocks, n_peaks, n_share)
     if counts.min() == 0:
-        return _no_lines(n_nodes, Status.NO_WINDOW)
+        return _no_lines(n_nodes, deviation, Status.NO_WINDOW)
     table = np.full((n_nodes, first.shape[1], len(QUANTITIES)), np.nan)
     work = lines.work_arrays(int((last - first).max()) + 1)
     _fill_lines(recording.x, first, last, counts, n_peaks - 1, refine == "sine-fit", work, table)
@@ -227,7 +232,9 @@ def window_lines(
         values[_PHASE] -= 2.0 * np.pi * values[_FREQUENCY] * recording.t[first]
     values[_PHASE] = wrap(values[_PHASE])
     amplitude, frequency, phase, baseline = values
-    return WindowLines(amplitude, frequency, phase, baseline, first, last, counts, Status.DONE)
+    return WindowLines(
+        *(amplitude, frequency, phase, baseline, first, last, counts, deviation, Status.DONE)
+    )
 
 
 def wrap(angle: Array) -> Array:
@@ -236,11 +243,11 @@ def wrap(angle: Array) -> Array:
     return np.where(inside >= np.pi, -np.pi, np.maximum(inside, -np.pi))
 
 
-def _no_lines(n_nodes: int, status: Status) -> WindowLines:
+def _no_lines(n_nodes: int, deviation: float, status: Status) -> WindowLines:
     none = np.empty((n_nodes, 0))
     samples = np.empty((1, 0), dtype=np.int64)
     counts = np.zeros(1, dtype=np.int64)
-    return WindowLines(none, none, none, none, samples, samples, counts, status)
+    return WindowLines(none, none, none, none, samples, samples, counts, deviation, status)
 
 
 def _place_windows(

@@ -57,8 +57,8 @@ def range_of(x: ArrayLike) -> float:
     BadInput
         x is not of shape (times, nodes), or holds a value that is not finite.
     """
-    rows = _rows("x", x)
-    return float(rows.max() - rows.min())
+    rows = node_rows("x", x)
+    return float(_finite(rows.max() - rows.min(), "x"))
 
 
 def differences(x: ArrayLike) -> Array:
@@ -91,7 +91,7 @@ def local_sigma(x: ArrayLike, groups: int) -> Array:
     BadInput
         As `sigma`; or a number of groups outside 1 .. N.
     """
-    rows = _rows("x", x)
+    rows = node_rows("x", x)
     n_nodes = rows.shape[0]
     groups = integer("groups", groups)
     if not 1 <= groups <= n_nodes:
@@ -101,6 +101,7 @@ def local_sigma(x: ArrayLike, groups: int) -> Array:
     sizes[:larger] += 1
     out = np.empty(groups)
     _local_sigma(rows, np.concatenate([[0], np.cumsum(sizes)]), np.empty(_CHUNK), out)
+    _finite(out, "x and its squares")
     return out
 
 
@@ -171,11 +172,12 @@ def order_parameter(u: ArrayLike, w: ArrayLike) -> float:
     BadInput
         Shapes that are wrong or differ, or a value that is not finite.
     """
-    x, y = _rows("u", u), _rows("w", w)
+    x, y = node_rows("u", u), node_rows("w", w)
     if x.shape != y.shape:
         raise BadInput(f"u and w must have one shape, not {x.T.shape} and {y.T.shape}")
     work = np.empty((2, _CHUNK))
-    return float(_order_parameter(x, y, x.mean(axis=1), y.mean(axis=1), work))
+    order = _order_parameter(x, y, x.mean(axis=1), y.mean(axis=1), work)
+    return float(_finite(order, "u and w"))
 
 
 @jit()
@@ -226,12 +228,11 @@ def _order_parameter(x: Any, y: Any, x_mean: Any, y_mean: Any, vector: Any) -> A
     return total / (n_nodes * n_times)
 
 
-def _rows(name: str, x: ArrayLike) -> Array:
-    """The nodes as contiguous rows (N, T) of finite samples."""
-    rows = node_rows(name, x)
-    if not np.isfinite(rows).all():
-        raise BadInput(f"{name} must be finite")
-    return rows
+def _finite(result: Any, what: str) -> Any:
+    """The result; any value of the signals that is not finite has made it so too."""
+    if not np.isfinite(result).all():
+        raise BadInput(f"{what} must be finite")
+    return result
 
 
 def _coherent(local: ArrayLike, delta: float | Array) -> Array:

@@ -36,11 +36,10 @@ def quantise(rows: Any, scale: float, missing: int, out: Any) -> None:
                 out[t, i] = int(steps) if abs(steps) <= limit else missing
 
 
-def by_node(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return `rows` (n, T) so that each row is contiguous, a tile at a time."""
+def by_node(rows: NDArray[np.float64], out: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `rows` (n, T) so that each row is contiguous: in `out`, unless they are already."""
     if rows.flags.c_contiguous:
         return rows
-    out = np.empty(rows.shape)
     _transpose(rows.T, out)
     return out
 

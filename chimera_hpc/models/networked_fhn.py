@@ -13,7 +13,24 @@ from numpy.typing import NDArray
 from chimera_hpc.errors import BadInput
 from chimera_hpc.integrate._jit import jit
 from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
-from chimera_hpc.integrate.simd import LANES, load, splat, store
+from chimera_hpc.integrate.simd import (
+    LANES,
+    last_of,
+    load,
+    load_at,
+    load_some,
+    splat,
+    store,
+    store_at,
+    store_some,
+)
+from chimera_hpc.models.sliding import (
+    changes_along,
+    first_across,
+    first_along,
+    rest_across,
+    stride_across,
+)
 
 Array = NDArray[np.float64]
 
@@ -21,34 +38,88 @@ THIRD = 1.0 / 3.0
 
 
 @jit()
-def _networked(like: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
-    # Both sums over the 2P neighbours slide along the ring together.
+def _activator(x: Any, y: Any, pull_x: Any, pull_y: Any, numbers: Any) -> Any:
+    rate, _, gain, same, cross = numbers
+    return (x - x * x * x * THIRD - y + gain * (same * pull_x + cross * pull_y)) * rate
+
+
+@jit()
+def _inhibitor(x: Any, pull_x: Any, pull_y: Any, numbers: Any) -> Any:
+    _, b, gain, same, cross = numbers
+    return x + b + gain * (same * pull_y - cross * pull_x)
+
+
+@jit()
+def _keep(zero: Any, i: Any, total_y: Any, context: Any) -> None:
+    _, slopes, n, _, _ = context
+    store(slopes, n + i, total_y)
+
+
+@jit()
+def _node(zero: Any, i: Any, total_x: Any, context: Any) -> None:
+    state, slopes, n, width, numbers = context
+    x, y = load(zero, state, i), load(zero, state, n + i)
+    pull_x, pull_y = total_x - width * x, load(zero, slopes, n + i) - width * y
+    store(slopes, i, _activator(x, y, pull_x, pull_y, numbers))
+    store(slopes, n + i, _inhibitor(x, pull_x, pull_y, numbers))
+
+
+@jit()
+def _across(zero: Any, state: Any, slopes: Any, params: Any, ints: Any) -> None:
+    # Node by node, in all lanes together; the sums of y wait in the place of y's slopes.
     n, half = ints[0], ints[1]
-    rate, b, gain = load(like, params, 0), load(like, params, 1), load(like, params, 2)
-    same, cross = load(like, params, 3), load(like, params, 4)
+    numbers = (
+        load(zero, params, 0),
+        load(zero, params, 1),
+        load(zero, params, 2),
+        load(zero, params, 3),
+        load(zero, params, 4),
+    )
+    context = (state, slopes, n, 2.0 * half + 1.0, numbers)
+    total_x = first_across(zero, state, 0, n, half)
+    total_y = first_across(zero, state, n, n, half)
+    for i in range(0, n - LANES + 1, LANES):
+        total_y = stride_across(zero, state, n, n, half, total_y, i, _keep, context)
+        total_x = stride_across(zero, state, 0, n, half, total_x, i, _node, context)
+    rest_across(zero, state, n, n, half, total_y, _keep, context)
+    rest_across(zero, state, 0, n, half, total_x, _node, context)
+
+
+@jit()
+def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
+    # One trajectory, eight nodes at a time.
+    n, half = ints[0], ints[1]
+    numbers = (params[0, 0], params[1, 0], params[2, 0], params[3, 0], params[4, 0])
     width = 2.0 * half + 1.0
-    sum_x, sum_y = load(like, y, n - 1), load(like, y, 2 * n - 1)
-    for k in range(1, half + 1):
-        sum_x = sum_x + (load(like, y, k - 1) + load(like, y, n - 1 - k))
-        sum_y = sum_y + (load(like, y, n + k - 1) + load(like, y, 2 * n - 1 - k))
-    ahead, behind = half, n - half - 1
-    for i in range(n):
-        sum_x = sum_x + (load(like, y, ahead) - load(like, y, behind))
-        sum_y = sum_y + (load(like, y, n + ahead) - load(like, y, n + behind))
-        ahead = ahead + 1 if ahead + 1 < n else 0
-        behind = behind + 1 if behind + 1 < n else 0
-        x, z = load(like, y, i), load(like, y, n + i)
-        pull_x, pull_y = sum_x - width * x, sum_y - width * z
-        store(dy, i, (x - x * x * x * THIRD - z + gain * (same * pull_x + cross * pull_y)) * rate)
-        store(dy, n + i, x + b + gain * (same * pull_y - cross * pull_x))
+    before_x, before_y = first_along(state, 0, n, half), first_along(state, n, n, half)
+    for i in range(0, n, LANES):
+        change_x, change_y = (
+            changes_along(state, 0, n, half, i),
+            changes_along(state, n, n, half, i),
+        )
+        left = n - i
+        x = load_at(state, i) if left >= LANES else load_some(state, i, 0, left)
+        y = load_at(state, n + i) if left >= LANES else load_some(state, n + i, 0, left)
+        pull_x, pull_y = before_x + change_x - width * x, before_y + change_y - width * y
+        slope_x = _activator(x, y, pull_x, pull_y, numbers)
+        slope_y = _inhibitor(x, pull_x, pull_y, numbers)
+        if left >= LANES:
+            store_at(slopes, i, slope_x)
+            store_at(slopes, n + i, slope_y)
+        else:
+            store_some(slopes, i, slope_x, left)
+            store_some(slopes, n + i, slope_y, left)
+        before_x, before_y = before_x + last_of(change_x), before_y + last_of(change_y)
 
 
 def networked_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
     """Right-hand side; ``lane_params`` rows: 1/epsilon, b, sigma/2P, cos phi, sin phi."""
     if y.shape[1] == LANES:
-        _networked(splat(0.0), y, dy, lane_params, int_params)
+        _across(splat(0.0), y, dy, lane_params, int_params)
+    elif int_params[0] >= LANES:
+        _along(y, dy, lane_params, int_params)
     else:
-        _networked(0.0, y, dy, lane_params, int_params)
+        _across(0.0, y, dy, lane_params, int_params)
 
 
 @cache

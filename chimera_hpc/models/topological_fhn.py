@@ -15,8 +15,6 @@ from chimera_hpc.integrate._jit import jit
 from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
 from chimera_hpc.integrate.simd import (
     LANES,
-    add_shifted,
-    fold,
     last_of,
     load,
     load_at,
@@ -25,6 +23,13 @@ from chimera_hpc.integrate.simd import (
     store,
     store_at,
     store_some,
+)
+from chimera_hpc.models.sliding import (
+    changes_along,
+    first_across,
+    first_along,
+    rest_across,
+    stride_across,
 )
 from chimera_hpc.topology import Topology
 
@@ -43,59 +48,15 @@ def _recovery(u: Any, w: Any, source: Any, total: Any, width: Any, c: Any) -> An
     return source + c * w + (width * u - total)
 
 
-# (L0 u)_i = (2P + 1) u_i - sum_{|k| <= P} u_{i+k}. The window slides along the ring once, in
-# strides of eight nodes: the changes u_{i+P} - u_{i-P-1} add up within a stride (`simd.SCAN`),
-# then to the window's sum before it. A step costs the same for every P, and eight nodes of one
-# trajectory can go together as eight trajectories do, with the same additions in the same order.
+# (L0 u)_i = (2P + 1) u_i - sum_{|k| <= P} u_{i+k}, the sum being that of a sliding window.
 
 
 @jit()
-def _change(zero: Any, y: Any, n: Any, half: Any, i: Any) -> Any:
-    ahead, behind = i + half, i - half - 1
-    ahead = ahead - n if ahead >= n else ahead
-    behind = behind + n if behind < 0 else behind
-    return load(zero, y, ahead) - load(zero, y, behind)
-
-
-@jit()
-def _node(
-    zero: Any, y: Any, dy: Any, params: Any, n: Any, i: Any, total: Any, width: Any, c: Any,
-    rate: Any,
-) -> None:  # fmt: skip
+def _node(zero: Any, i: Any, total: Any, context: Any) -> None:
+    y, dy, params, n, width, c, rate = context
     u, w = load(zero, y, i), load(zero, y, n + i)
     store(dy, i, _activator(u, w, rate))
     store(dy, n + i, _recovery(u, w, load(zero, params, 2 + i), total, width, c))
-
-
-@jit()
-def _around(zero: Any, y: Any, n: Any, i: Any) -> Any:
-    return load(zero, y, i if i < n else i - n)
-
-
-@jit()
-def _first_window(zero: Any, y: Any, n: Any, half: Any) -> Any:
-    # The window of node -1: eight sums in turn, folded as in `simd.fold`.
-    s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
-    start, end = n - half - 1, n + half
-    whole = end - (2 * half + 1) % 8
-    for i in range(start, whole, 8):
-        s0 = s0 + _around(zero, y, n, i)
-        s1 = s1 + _around(zero, y, n, i + 1)
-        s2 = s2 + _around(zero, y, n, i + 2)
-        s3 = s3 + _around(zero, y, n, i + 3)
-        s4 = s4 + _around(zero, y, n, i + 4)
-        s5 = s5 + _around(zero, y, n, i + 5)
-        s6 = s6 + _around(zero, y, n, i + 6)
-        s7 = s7 + _around(zero, y, n, i + 7)
-    i, left = whole, end - whole
-    s0 = s0 + _around(zero, y, n, i) if left > 0 else s0
-    s1 = s1 + _around(zero, y, n, i + 1) if left > 1 else s1
-    s2 = s2 + _around(zero, y, n, i + 2) if left > 2 else s2
-    s3 = s3 + _around(zero, y, n, i + 3) if left > 3 else s3
-    s4 = s4 + _around(zero, y, n, i + 4) if left > 4 else s4
-    s5 = s5 + _around(zero, y, n, i + 5) if left > 5 else s5
-    s6 = s6 + _around(zero, y, n, i + 6) if left > 6 else s6
-    return ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7))
 
 
 @jit()
@@ -103,62 +64,11 @@ def _reduced_across(zero: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
     # Node by node, in all lanes together.
     n, half = ints[0], ints[1]
     rate, c = load(zero, params, 0), load(zero, params, 1)
-    width = 2.0 * half + 1.0
-    before = _first_window(zero, y, n, half)
-    whole = n - n % 8
-    for i in range(0, whole, 8):
-        x0, x1 = _change(zero, y, n, half, i), _change(zero, y, n, half, i + 1)
-        x1 = x1 + x0
-        _node(zero, y, dy, params, n, i, before + x0, width, c, rate)
-        _node(zero, y, dy, params, n, i + 1, before + x1, width, c, rate)
-        x2, x3 = _change(zero, y, n, half, i + 2), _change(zero, y, n, half, i + 3)
-        x3 = x3 + x2
-        x2, x3 = x2 + x1, x3 + x1
-        _node(zero, y, dy, params, n, i + 2, before + x2, width, c, rate)
-        _node(zero, y, dy, params, n, i + 3, before + x3, width, c, rate)
-        x4, x5 = _change(zero, y, n, half, i + 4), _change(zero, y, n, half, i + 5)
-        x5 = x5 + x4
-        x6, x7 = _change(zero, y, n, half, i + 6), _change(zero, y, n, half, i + 7)
-        x7 = x7 + x6
-        x6, x7 = x6 + x5, x7 + x5
-        x4, x5, x6, x7 = x4 + x3, x5 + x3, x6 + x3, x7 + x3
-        _node(zero, y, dy, params, n, i + 4, before + x4, width, c, rate)
-        _node(zero, y, dy, params, n, i + 5, before + x5, width, c, rate)
-        _node(zero, y, dy, params, n, i + 6, before + x6, width, c, rate)
-        before = before + x7
-        _node(zero, y, dy, params, n, i + 7, before, width, c, rate)
-    i, left = whole, n - whole
-    if left > 0:
-        x0 = _change(zero, y, n, half, i)
-        _node(zero, y, dy, params, n, i, before + x0, width, c, rate)
-    if left > 1:
-        x1 = _change(zero, y, n, half, i + 1) + x0
-        _node(zero, y, dy, params, n, i + 1, before + x1, width, c, rate)
-    if left > 2:
-        x2 = _change(zero, y, n, half, i + 2)
-        _node(zero, y, dy, params, n, i + 2, before + (x2 + x1), width, c, rate)
-    if left > 3:
-        x3 = _change(zero, y, n, half, i + 3) + x2
-        x3 = x3 + x1
-        _node(zero, y, dy, params, n, i + 3, before + x3, width, c, rate)
-    if left > 4:
-        x4 = _change(zero, y, n, half, i + 4)
-        _node(zero, y, dy, params, n, i + 4, before + (x4 + x3), width, c, rate)
-    if left > 5:
-        x5 = _change(zero, y, n, half, i + 5) + x4
-        _node(zero, y, dy, params, n, i + 5, before + (x5 + x3), width, c, rate)
-    if left > 6:
-        x6 = _change(zero, y, n, half, i + 6) + x5
-        _node(zero, y, dy, params, n, i + 6, before + (x6 + x3), width, c, rate)
-
-
-@jit()
-def _load_ring(y: Any, i: Any, n: Any) -> Any:
-    # Eight neighbours from node i on, 0 <= i < 2n, over the end of the ring.
-    i = i - n if i >= n else i
-    if i + 8 <= n:
-        return load_at(y, i)
-    return load_some(y, i, 0, n - i) + load_some(y, i - n, n - i, 8)
+    context = (y, dy, params, n, 2.0 * half + 1.0, c, rate)
+    total = first_across(zero, y, 0, n, half)
+    for i in range(0, n - LANES + 1, LANES):
+        total = stride_across(zero, y, 0, n, half, total, i, _node, context)
+    rest_across(zero, y, 0, n, half, total, _node, context)
 
 
 @jit()
@@ -167,19 +77,9 @@ def _reduced_along(y: Any, dy: Any, params: Any, ints: Any) -> None:
     n, half = ints[0], ints[1]
     rate, c = params[0, 0], params[1, 0]
     width = 2.0 * half + 1.0
-    total = splat(0.0)
-    left, i = 2 * half + 1, n - half - 1
-    while left >= 8:
-        total = total + _load_ring(y, i, n)
-        i, left = i + 8, left - 8
-        i = i - n if i >= n else i
-    if left > 0:
-        split = min(n - i, left)
-        total = total + (load_some(y, i, 0, split) + load_some(y, i - n, split, left))
-    before = fold(total)
+    before = first_along(y, 0, n, half)
     for i in range(0, n, 8):
-        x = _load_ring(y, i + half, n) - _load_ring(y, i + n - half - 1, n)
-        x = add_shifted(add_shifted(add_shifted(x, 0), 1), 2)
+        x = changes_along(y, 0, n, half, i)
         total = before + x
         before = before + last_of(x)
         if i + 8 <= n:

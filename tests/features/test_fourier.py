@@ -173,6 +173,8 @@ def test_the_limit_is_on_the_mean_over_nodes_of_the_deviation():
     deviation = u.std(axis=0).mean()
     assert fourier_features(T, u, clock_node=3, still=deviation * 1.001).status is Status.STEADY
     assert fourier_features(T, u, clock_node=3, still=deviation * 0.999).status is Status.DONE
+    for still in (0.0, 10.0):
+        assert fourier_features(T, u, still=still).deviation == pytest.approx(deviation, rel=1e-12)
 
 
 def test_a_constant_run_has_no_window_if_nothing_counts_as_still():

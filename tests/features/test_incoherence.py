@@ -154,7 +154,7 @@ def test_layout_changes_no_bit():
         (lambda: local_sigma(X, 1.5), "groups must be a whole number"),
         (lambda: sigma(X[0]), r"x must have shape \(times, nodes\), not \(4,\)"),
         (lambda: sigma(np.empty((0, 3))), "x must have shape"),
-        (lambda: sigma([[np.nan, 0.0]]), "x must be finite"),
+        (lambda: sigma([[np.nan, 0.0]]), "x and its squares must be finite"),
         (lambda: range_of([[np.inf, 0.0]]), "x must be finite"),
         (lambda: sigma([["a", "b"]]), "x must be an array of real numbers"),
         (lambda: order_parameter(X, X[:, :2]), r"one shape, not \(2, 4\) and \(2, 2\)"),
