@@ -41,8 +41,8 @@ array = 4
 """
 
 
-LONG = 6000.0
-"""Time of runs that let a sweep last for some four seconds on two cores."""
+LONG = 4000.0
+"""Time of runs that let a sweep last for some three seconds on two cores."""
 
 
 def write_job(folder: Path, t_end: float = 100.0, block: int = 4) -> Path:

@@ -50,9 +50,21 @@ class _PackModel(models.PrimitiveModel):
         super().__init__(manager, pack, _VECTOR)  # type: ignore[no-untyped-call]
 
 
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, offset: Any) -> Any:
-    struct = context.make_array(array_type)(context, builder, array)
-    return builder.gep(struct.data, [offset])
+def _pointer(
+    context: Any, builder: Any, signature: Any, args: Any, kind: str, first: int = 0
+) -> Any:
+    """Pointer into an array (rows, lanes), argument ``first``, at the place that follows it.
+
+    ``kind`` says what the place counts and what is there: "number" and "pack" count numbers,
+    "row" counts rows of packs.
+    """
+    array_type, at_type = signature.args[first : first + 2]
+    offset = context.cast(builder, args[first + 1], at_type, types.intp)
+    if kind == "row":
+        offset = builder.mul(offset, ir.Constant(offset.type, LANES))
+    struct = context.make_array(array_type)(context, builder, args[first])
+    pointer = builder.gep(struct.data, [offset])
+    return pointer if kind == "number" else builder.bitcast(pointer, _VECTOR.as_pointer())
 
 
 def _spread(builder: Any, number: Any) -> Any:
@@ -157,13 +169,8 @@ else:
         """Read row ``row`` of ``array`` (rows, lanes) as the kind of number ``like`` is."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            _, array_type, row_type = signature.args
-            row = context.cast(builder, args[2], row_type, types.intp)
-            if isinstance(like, PackType):
-                row = builder.mul(row, ir.Constant(row.type, LANES))
-            pointer = _pointer(context, builder, array_type, args[1], row)
-            if isinstance(like, PackType):
-                pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
+            kind = "row" if isinstance(like, PackType) else "number"
+            pointer = _pointer(context, builder, signature, args, kind, first=1)
             return builder.load(pointer, align=8)
 
         result = pack_type if isinstance(like, PackType) else types.float64
@@ -174,14 +181,10 @@ else:
         """Read the lanes' numbers as a pack; one lane's number stands in all places."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            _, array_type, row_type = signature.args
-            row = context.cast(builder, args[2], row_type, types.intp)
-            if isinstance(like, PackType):
-                row = builder.mul(row, ir.Constant(row.type, LANES))
-            pointer = _pointer(context, builder, array_type, args[1], row)
-            if isinstance(like, PackType):
-                return builder.load(builder.bitcast(pointer, _VECTOR.as_pointer()), align=8)
-            return _spread(builder, builder.load(pointer, align=8))
+            kind = "row" if isinstance(like, PackType) else "number"
+            pointer = _pointer(context, builder, signature, args, kind, first=1)
+            value = builder.load(pointer, align=8)
+            return value if kind == "row" else _spread(builder, value)
 
         return pack_type(like, array, row), generate
 
@@ -190,10 +193,8 @@ else:
         """Read a pack of neighbours from the numbers of ``array`` in the order of memory."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            array_type, offset_type = signature.args
-            offset = context.cast(builder, args[1], offset_type, types.intp)
-            pointer = _pointer(context, builder, array_type, args[0], offset)
-            return builder.load(builder.bitcast(pointer, _VECTOR.as_pointer()), align=8)
+            pointer = _pointer(context, builder, signature, args, "pack")
+            return builder.load(pointer, align=8)
 
         return pack_type(array, offset), generate
 
@@ -202,10 +203,8 @@ else:
         """Write a pack over neighbours among the numbers of ``array`` in the order of memory."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            array_type, offset_type, _ = signature.args
-            offset = context.cast(builder, args[1], offset_type, types.intp)
-            pointer = _pointer(context, builder, array_type, args[0], offset)
-            builder.store(args[2], builder.bitcast(pointer, _VECTOR.as_pointer()), align=8)
+            pointer = _pointer(context, builder, signature, args, "pack")
+            builder.store(args[2], pointer, align=8)
             return context.get_dummy_value()
 
         return types.void(array, offset, pack), generate
@@ -215,11 +214,9 @@ else:
         """Read places ``low <= j < high`` of a pack as `load_at` does; -0.0 elsewhere."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            array_type, *kinds = signature.args
-            numbers = zip(args[1:], kinds, strict=True)
-            offset, low, high = (context.cast(builder, n, kind, types.intp) for n, kind in numbers)
-            pointer = _pointer(context, builder, array_type, args[0], offset)
-            pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
+            pointer = _pointer(context, builder, signature, args, "pack")
+            bounds = zip(args[2:], signature.args[2:], strict=True)
+            low, high = (context.cast(builder, n, kind, types.intp) for n, kind in bounds)
             mask = builder.and_(
                 builder.icmp_signed(">=", _places(), _spread_integer(builder, low)),
                 builder.icmp_signed("<", _places(), _spread_integer(builder, high)),
@@ -236,11 +233,8 @@ else:
         """Write the first ``count`` places of a pack as `store_at` does."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            array_type, offset_type, _, count_type = signature.args
-            offset = context.cast(builder, args[1], offset_type, types.intp)
-            count = context.cast(builder, args[3], count_type, types.intp)
-            pointer = _pointer(context, builder, array_type, args[0], offset)
-            pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
+            count = context.cast(builder, args[3], signature.args[3], types.intp)
+            pointer = _pointer(context, builder, signature, args, "pack")
             mask = builder.icmp_signed("<", _places(), _spread_integer(builder, count))
             kind = ir.FunctionType(
                 ir.VoidType(), [_VECTOR, pointer.type, ir.IntType(32), mask.type]
@@ -297,13 +291,8 @@ else:
         """Write a number or a pack into row ``row`` of ``array`` (rows, lanes)."""
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            array_type, row_type, _ = signature.args
-            row = context.cast(builder, args[1], row_type, types.intp)
-            if isinstance(value, PackType):
-                row = builder.mul(row, ir.Constant(row.type, LANES))
-            pointer = _pointer(context, builder, array_type, args[0], row)
-            if isinstance(value, PackType):
-                pointer = builder.bitcast(pointer, _VECTOR.as_pointer())
+            kind = "row" if isinstance(value, PackType) else "number"
+            pointer = _pointer(context, builder, signature, args, kind)
             builder.store(args[2], pointer, align=8)
             return context.get_dummy_value()
 

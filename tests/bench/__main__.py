@@ -74,7 +74,8 @@ def _part(part: str, sizes: Sizes, folder: Path, results: Results, tiny: bool) -
             os.sched_setaffinity(0, cores)
     if part == "sweeps":
         settings = ["P=3:4", "seeds=1", "integrator.t_end=20", "features.start=10"] if tiny else []
-        rows = sweeps.workers(folder, settings)
+        seeds = (1,) if tiny else (1, 5)
+        rows = sweeps.workers(folder, settings, seeds, results.scaling)
         rows += sweeps.memory((55.0, 60.0) if tiny else (1000.0, 10_000.0))
         return rows + sweeps.starting(folder, 1 if tiny else 3)
     if part == "reduction":
@@ -86,8 +87,7 @@ def _single(part: str, sizes: Sizes, results: Results, tiny: bool) -> list[Row]:
     if part == "peers":
         return single.against_peers(sizes)
     if part == "steps":
-        rows, results.nodes = single.stepping(sizes)
-        return rows
+        return single.stepping(sizes, results.scaling)
     if part == "features":
         return single.features(sizes)
     if part == "networked":

@@ -1,4 +1,4 @@
-"""docs/performance.md and its picture."""
+"""docs/performance.md and its pictures."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from precision import Curve
 from projection import Costs, Forecast
 from reduction import Size
-from single import Row
+from single import Row, Scaling
 
 
 @dataclass
@@ -21,7 +23,7 @@ class Results:
     load: float
     rows: list[Row] = field(default_factory=list)
     precision: dict[str, Curve] = field(default_factory=dict)
-    nodes: list[tuple[int, float]] = field(default_factory=list)
+    scaling: Scaling = field(default_factory=Scaling)
     sizes: list[Size] = field(default_factory=list)
     costs: Costs | None = None
     forecasts: list[tuple[str, Forecast]] = field(default_factory=list)
@@ -46,6 +48,8 @@ def text(results: Results) -> str:
     parts.append(_ERRORS)
     if results.precision:
         parts += [_PICTURE]
+    if results.scaling.nodes:
+        parts += [_SCALING]
     if results.sizes:
         parts += [_REDUCTION, table(["points", "leaves of the tree", "s", "labels equal"], [
             [f"{size.points:,}", f"{size.leaves:,}", f"{size.seconds:.2f}",
@@ -72,36 +76,60 @@ def text(results: Results) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def picture(results: Results) -> Figure:
-    """Draw work against precision, and cost against the number of nodes."""
-    figure = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
+def precision_picture(results: Results) -> Figure:
+    """Draw work against precision."""
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    axes = figure.subplots()
     for k, (name, curve) in enumerate(results.precision.items()):
         ours = name.startswith("ours")
         errors, seconds = zip(*curve, strict=True)
-        left.loglog(errors, seconds, "o-" if ours else "s--", ms=4, label=name, color=f"C{k}")
-    left.set_xlabel("largest error of u, t ≤ 20")
-    left.set_ylabel("seconds a trajectory (u every 0.01)")
-    left.set_title("(a) work against precision, P = 12", loc="left")
-    left.legend(fontsize=7)
-    if results.nodes:
-        nodes, costs = zip(*results.nodes, strict=True)
-        right.loglog(nodes, [n * c * 1e6 for n, c in results.nodes], "o-", label="measured")
-        right.loglog(nodes, [n * costs[0] * 1e6 for n in nodes], "k:", label="linear")
-        right.set_xlabel("nodes")
-        right.set_ylabel("µs a step and trajectory, in lanes")
-        right.set_title("(b) cost of a step", loc="left")
-        right.legend(fontsize=8)
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
+        axes.loglog(errors, seconds, "o-" if ours else "s--", ms=4, label=name, color=f"C{k}")
+    axes.set_xlabel("largest error of u, t ≤ 20")
+    axes.set_ylabel("seconds a trajectory (u every 0.01)")
+    axes.legend(fontsize=7)
+    axes.grid(alpha=0.3)
     return figure
 
 
+def scaling_picture(scaling: Scaling) -> Figure:
+    """Draw seconds against workers, points, nodes and coupling range, with the ideal lines."""
+    figure = Figure(figsize=(9, 7), layout="constrained")
+    workers, points, nodes, degrees = figure.subplots(2, 2).flat
+    _measured(workers, scaling.workers, "the plane: workers", "s, whole command", power=-1)
+    _measured(points, scaling.points, "two workers: points", "s, whole command", power=1)
+    whole = [(n, 1e6 * n * each) for n, each in scaling.nodes]
+    _measured(nodes, whole, "P = 12: nodes", "µs a step and trajectory", power=1)
+    steps = [(half, 1e6 * each) for half, each in sorted(scaling.degrees)]
+    _measured(degrees, steps, "50 nodes: P", "µs a step and trajectory, in lanes", power=0)
+    degrees.set_ylim(bottom=0)
+    return figure
+
+
+def _measured(
+    axes: Axes, curve: Sequence[tuple[int, float]], what: str, unit: str, power: int
+) -> None:
+    # The ideal line goes through the last point where start-up hides in the work, else the first.
+    if curve:
+        x, seconds = (np.array(values, dtype=float) for values in zip(*curve, strict=True))
+        draw = axes.loglog if power else axes.plot
+        at = -1 if power == 1 else 0
+        draw(x, seconds[at] * (x / x[at]) ** power, "k:", label="ideal")
+        draw(x, seconds, "o-", label="measured")
+        axes.set_xticks(x, [f"{value:,.0f}" for value in x], rotation=60 if len(x) > 6 else 0)
+        axes.minorticks_off()
+    axes.set_xlabel(what)
+    axes.set_ylabel(unit)
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+
+
 def write(results: Results, docs: Path) -> None:
-    """Write page and picture into the folder `docs`."""
+    """Write page and pictures into the folder `docs`."""
     (docs / "performance.md").write_text(text(results))
     if results.precision:
-        picture(results).savefig(docs / "images" / "performance.png", dpi=110)
+        precision_picture(results).savefig(docs / "images" / "performance.png", dpi=110)
+    if results.scaling.nodes:
+        scaling_picture(results.scaling).savefig(docs / "images" / "scaling.png", dpi=110)
 
 
 _HEAD = """# Measured performance
@@ -119,7 +147,9 @@ tolerance whose error is not larger than theirs, and what comes out at equal tol
 beside. Full form: nodes and links as the paper prints them, which is what a user of the peers
 would write; reduced form: the exact reduction that this package uses."""
 
-_PICTURE = """![Work against precision, cost against nodes](images/performance.png)"""
+_PICTURE = """![Work against precision](images/performance.png)"""
+
+_SCALING = """![Seconds against workers, points, nodes and P](images/scaling.png)"""
 
 _REDUCTION = """## Reduction at scale
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -50,6 +50,20 @@ class Row:
         held = "yes" if self.good else "**no**"
         value, target = (f"{x:.3g} {self.unit}".strip() for x in (self.value, self.target))
         return [self.what, value, f"{sign} {target}", held, self.note]
+
+
+@dataclass
+class Scaling:
+    """Seconds against what there is more of."""
+
+    nodes: list[tuple[int, float]] = field(default_factory=list)
+    """Nodes, and seconds a lane-step and node."""
+    degrees: list[tuple[int, float]] = field(default_factory=list)
+    """P, and seconds a lane-step of 50 nodes."""
+    workers: list[tuple[int, float]] = field(default_factory=list)
+    """Workers, and seconds of the whole plane."""
+    points: list[tuple[int, float]] = field(default_factory=list)
+    """Points, and seconds of a whole sweep with two workers."""
 
 
 @dataclass(frozen=True)
@@ -172,43 +186,47 @@ def _compare(
     return rows
 
 
-def lane_step(
-    n_nodes: int, half_degree: int, repeats: int, steps: int, t_end: float = 1000.0
-) -> tuple[float, float]:
-    """Return seconds a lane-step and the lane-steps tried in all, eight trajectories at once."""
-    ring = Ring(half_degree, n_nodes)
-    model = TopologicalFHN(ring.topology)
-    states = [model.state(*ring.initial(seed)) for seed in range(8)]
-    control = Control(t_end, t_end, 0.01, max_steps=steps)
-    taken: list[int] = []
+def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[float]:
+    """Return the seconds a lane-step of eight trajectories of each ring (N0, P, steps)."""
+    taken: dict[str, int] = {}
 
-    def run() -> None:
-        taken.clear()
-        integrate([model] * 8, states, control, 1, lambda _, end: taken.append(end.steps), lanes=8)
+    def run(name: str, model: TopologicalFHN, states: list[Array], steps: int) -> None:
+        control = Control(1000.0, 1000.0, 0.01, max_steps=steps)
+        ends: list[int] = []
+        integrate([model] * 8, states, control, 1, lambda _, end: ends.append(end.steps))
+        # All lanes try `steps` steps, unless they reach the end before.
+        taken[name] = sum(ends)
 
-    seconds = interleaved({"": run}, repeats)[""].median
-    # All lanes try `steps` steps, unless they reach the end before.
-    return seconds / sum(taken), float(sum(taken))
+    runs: dict[str, Callable[[], object]] = {}
+    for n_nodes, half_degree, steps in rings:
+        ring, name = Ring(half_degree, n_nodes), f"{n_nodes} {half_degree}"
+        model = TopologicalFHN(ring.topology)
+        states = [model.state(*ring.initial(seed)) for seed in range(8)]
+        runs[name] = partial(run, name, model, states, steps)
+    times = interleaved(runs, repeats)
+    return [times[name].median / taken[name] for name in runs]
 
 
-def stepping(sizes: Sizes) -> tuple[list[Row], list[tuple[int, float]]]:
+def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
     """Cost of a step: against dgemm, for two coupling ranges, for ever larger rings."""
     dgemm = multiplication_rate()
     long = 10 * sizes.steps
-    costs = {half: lane_step(50, half, sizes.repeats, long)[0] for half in (3, 24, 12)}
+    halves = (1, 3, 6, 12, 18, 24)
+    found = lane_steps([(50, half, long) for half in halves], sizes.repeats)
+    costs = dict(zip(halves, found, strict=True))
     share = FLOPS_PER_NODE * 50 / costs[12] / dgemm
     note = f"{1e6 * costs[12]:.3f} us a lane-step; dgemm {dgemm / 1e9:.1f} GFlop/s"
     rows = [Row("useful work of the stepping loop, of dgemm's rate", share, "", 0.25, True, note)]
-    note = ", ".join(f"P = {half}: {1e6 * cost:.3f} us" for half, cost in sorted(costs.items()))
+    scaling.degrees = list(costs.items())
+    note = ", ".join(f"P = {half}: {1e6 * cost:.3f} us" for half, cost in scaling.degrees)
     ratio = costs[24] / costs[3]
     rows.append(Row("a step at P = 24 over one at P = 3", ratio, "", 1.1, False, note))
-    curve = []
-    for n in sizes.nodes:
-        steps = max(sizes.steps * 50 // n, 20)
-        curve.append((n, lane_step(n, 12, sizes.repeats, steps)[0] / n))
-    per_node = np.array([cost for _, cost in curve])
+    rings = [(n, 12, max(sizes.steps * 50 // n, 20)) for n in sizes.nodes]
+    steps = lane_steps(rings, sizes.repeats)
+    scaling.nodes = [(n, cost / n) for n, cost in zip(sizes.nodes, steps, strict=True)]
+    per_node = np.array([cost for _, cost in scaling.nodes])
     # Caches make steps: within each of them the cost of a node should be level.
-    note = ", ".join(f"{n}: {1e9 * cost:.2f} ns" for n, cost in curve)
+    note = ", ".join(f"{n}: {1e9 * cost:.2f} ns" for n, cost in scaling.nodes)
     rows.append(
         Row(
             "cost of a node and step, dearest ring over the one of 50",
@@ -219,7 +237,7 @@ def stepping(sizes: Sizes) -> tuple[list[Row], list[tuple[int, float]]]:
             note,
         )
     )
-    return rows, curve
+    return rows
 
 
 def features(sizes: Sizes) -> list[Row]:

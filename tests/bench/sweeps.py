@@ -16,7 +16,7 @@ from pathlib import Path
 
 import psutil
 from programs import SCALE, load_program
-from single import Row
+from single import Row, Scaling
 
 ROOT = Path(__file__).parents[2]
 PLANE = ROOT / "jobs" / "paper" / "plane.toml"
@@ -99,9 +99,16 @@ def bare(job: Path, shares: int, settings: list[str]) -> float:
     return ended - began
 
 
-def workers(folder: Path, settings: list[str]) -> list[Row]:
+def workers(
+    folder: Path, settings: list[str], seeds: tuple[int, ...], scaling: Scaling
+) -> list[Row]:
     """The plane with one worker and with two, and its blocks without executor and store."""
     options = [word for setting in settings for word in ("--set", setting)]
+    for n in seeds:
+        out = folder / f"plane-seeds-{n}"
+        command = [*_SWEEP, "run", str(PLANE), "--out", str(out), *options, "--set", f"seeds={n}"]
+        seconds = watched([*command, "--workers", "2", "--no-figures"]).seconds
+        scaling.points.append((_points(out), seconds))
     runs = {}
     for n in (1, 2):
         out = folder / f"plane-{n}"
@@ -114,7 +121,9 @@ def workers(folder: Path, settings: list[str]) -> list[Row]:
     note = f"{runs[1].seconds:.1f} s and {runs[2].seconds:.1f} s; "
     note += f"without executor and store {alone[1]:.1f} s and {alone[2]:.1f} s ({limit:.2f} times)"
     both = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%}: start, planning, reduction included"
-    size = json.loads((folder / "plane" / "results.json").read_text())["points"]["total"]
+    size = _points(folder / "plane")
+    scaling.workers = [(n, run.seconds) for n, run in runs.items()]
+    scaling.points.append((size, runs[2].seconds))
     return [
         Row("2 workers over 1, whole command", gain, "times", 1.9, True, note),
         Row("whole command over bare blocks, minus one", max(cost.values()), "", 0.05, False, both),
@@ -122,6 +131,11 @@ def workers(folder: Path, settings: list[str]) -> list[Row]:
         Row(f"the {size}-point plane, 2 workers, figures included", full.seconds / 60, "minutes",
             6.0, False),
     ]  # fmt: skip
+
+
+def _points(out: Path) -> int:
+    total: int = json.loads((out / "results.json").read_text())["points"]["total"]
+    return total
 
 
 def memory(t_ends: tuple[float, float]) -> list[Row]:

@@ -36,7 +36,8 @@ def test_every_part_runs_and_leaves_a_page(tmp_path):
     assert len(rows) == 16
     assert all(np.isfinite(row["value"]) for row in rows)
     assert "10 million points" in (tmp_path / "performance.md").read_text()
-    assert (tmp_path / "images" / "performance.png").stat().st_size > 10_000
+    for name in ("performance", "scaling"):
+        assert (tmp_path / "images" / f"{name}.png").stat().st_size > 10_000
 
 
 def test_peers_solve_the_same_problem(bench):
