@@ -57,15 +57,8 @@ def draw_dendrogram(
     axes.set_xticks([])
     axes.set_xlabel(f"{len(leaf_labels)} runs", labelpad=6.0)
     axes.set_ylabel("depth $d$ (scaled units)")
-    axes.annotate(
-        f"$d$ = {depth:.3g}",
-        (0.98, depth),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 3),
-        textcoords="offset points",
-        ha="right",
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
-    )
+    # Beside the panel's letter: at the line itself it would cover branches.
+    axes.set_title(f"cut at $d$ = {depth:.3g}", loc="right", fontsize="medium")
 
 
 def brackets(

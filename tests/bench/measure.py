@@ -34,19 +34,26 @@ class Timing:
         return (max(self.seconds) - min(self.seconds)) / 2 / self.median
 
 
-def interleaved(contenders: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, Timing]:
+def interleaved(
+    contenders: Mapping[str, Callable[[], object]], repeats: int, at_least: float = 0.0
+) -> dict[str, Timing]:
     """Time each contender once a round, so that a busy moment of the machine meets all of them.
 
-    Each has run once before, unmeasured: compilation is measured elsewhere.
+    In its turn a contender is called again until `at_least` seconds have gone by, and their mean
+    counts: a machine that changes its speed within seconds meets short and long ones alike. Each
+    has run once before, unmeasured: compilation is measured elsewhere.
     """
     for run in contenders.values():
         run()
     times: dict[str, list[float]] = {name: [] for name in contenders}
     for _ in range(repeats):
         for name, run in contenders.items():
-            began = time.perf_counter()
-            run()
-            times[name].append(time.perf_counter() - began)
+            began, calls, elapsed = time.perf_counter(), 0, -1.0
+            while elapsed < at_least:
+                run()
+                calls += 1
+                elapsed = time.perf_counter() - began
+            times[name].append(elapsed / calls)
     return {name: Timing(tuple(seconds)) for name, seconds in times.items()}
 
 

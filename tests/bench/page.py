@@ -78,7 +78,7 @@ def text(results: Results) -> str:
 
 def precision_picture(results: Results) -> Figure:
     """Draw work against precision."""
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    figure = Figure(figsize=(7.6, 4.2), layout="constrained")
     axes = figure.subplots()
     for k, (name, curve) in enumerate(results.precision.items()):
         ours = name.startswith("ours")
@@ -86,7 +86,7 @@ def precision_picture(results: Results) -> Figure:
         axes.loglog(errors, seconds, "o-" if ours else "s--", ms=4, label=name, color=f"C{k}")
     axes.set_xlabel("largest error of u, t ≤ 20")
     axes.set_ylabel("seconds a trajectory (u every 0.01)")
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes.grid(alpha=0.3)
     return figure
 
@@ -96,7 +96,7 @@ def scaling_picture(scaling: Scaling) -> Figure:
     figure = Figure(figsize=(9, 7), layout="constrained")
     workers, points, nodes, degrees = figure.subplots(2, 2).flat
     _measured(workers, scaling.workers, "the plane: workers", "s, whole command", power=-1)
-    _measured(points, scaling.points, "two workers: points", "s, whole command", power=1)
+    _measured(points, scaling.points, "two workers: points", "s, whole command", power=1, at=-1)
     whole = [(n, 1e6 * n * each) for n, each in scaling.nodes]
     _measured(nodes, whole, "P = 12: nodes", "µs a step and trajectory", power=1)
     steps = [(half, 1e6 * each) for half, each in sorted(scaling.degrees)]
@@ -106,13 +106,12 @@ def scaling_picture(scaling: Scaling) -> Figure:
 
 
 def _measured(
-    axes: Axes, curve: Sequence[tuple[int, float]], what: str, unit: str, power: int
+    axes: Axes, curve: Sequence[tuple[int, float]], what: str, unit: str, power: int, at: int = 0
 ) -> None:
-    # The ideal line goes through the last point where start-up hides in the work, else the first.
+    # The ideal line goes through point `at`: the last one where only there start-up is hidden.
     if curve:
         x, seconds = (np.array(values, dtype=float) for values in zip(*curve, strict=True))
         draw = axes.loglog if power else axes.plot
-        at = -1 if power == 1 else 0
         draw(x, seconds[at] * (x / x[at]) ** power, "k:", label="ideal")
         draw(x, seconds, "o-", label="measured")
         axes.set_xticks(x, [f"{value:,.0f}" for value in x], rotation=60 if len(x) > 6 else 0)
@@ -137,7 +136,8 @@ _HEAD = """# Measured performance
     scripts/bench --write
 
 measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
-interleaved repeats; one core unless workers are named. Machine: {machine}; load average at the
+interleaved turns, in each of which a contender runs for at least a second; one core unless workers
+are named. Machine: {machine}; load average at the
 start {load:.1f}."""
 
 _ERRORS = """\

@@ -175,7 +175,11 @@ def starting(folder: Path, repeats: int) -> list[Row]:
         rows.append(Row(f"first point stored, kernels {name}", first, "s", limit, False))
     looked = str(folder / "first-warm-0")
     for words, limit in ((["--help"], 0.6), (["status", looked], 1.0)):
-        times = [watched([*_SWEEP, *words]).seconds for _ in range(repeats)]
+        times = []
+        for _ in range(repeats):
+            began = time.perf_counter()
+            subprocess.run([*_SWEEP, *words], stdout=subprocess.DEVNULL, check=True)
+            times.append(time.perf_counter() - began)
         rows.append(Row(f"`{words[0]}`", statistics.median(times), "s", limit, False))
     return rows
 
