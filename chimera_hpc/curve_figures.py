@@ -60,17 +60,22 @@ def draw_basin(outcome: Outcome) -> Figure | None:
 def draw_atlas(outcome: Outcome) -> Figure | None:
     """Draw a diamond for each cell over the judge's classes (paper fig:hvsnmin:orient:1b, 1a).
 
-    One panel for each value of the first axis, coloured by the second.
+    One panel for each value of the first axis, coloured by the second; with one axis, one panel
+    that is coloured by it.
     """
     entry = outcome.curves.get("atlas")
-    if entry is None or len(outcome.axes) < 2:
+    if entry is None or not outcome.axes:
         return None
-    (label, values), (parameter, colours) = outcome.axes[:2]
+    *first, (parameter, colours) = outcome.axes[:2]
+    groups = [("", np.full(len(colours), True))]
+    if first:
+        label, values = first[0]
+        each = dict.fromkeys(values.tolist())
+        groups = [(f"{label.rstrip('$')} = {value}$", values == value) for value in each]
     cells = next(iter(entry["judges"].values()))
     panels = []
-    for value in dict.fromkeys(values.tolist()):
-        chosen = [i for i in np.flatnonzero(values == value) if cells[i]["triplet"] is not None]
-        title = f"{label.rstrip('$')} = {value}$"
+    for title, group in groups:
+        chosen = [i for i in np.flatnonzero(group) if cells[i]["triplet"] is not None]
         triplets = _numbers([cells[i]["triplet"] for i in chosen]).reshape(-1, 3)
         panels.append(Diamonds(title, triplets, colours[chosen]))
     ground = entry["background"]

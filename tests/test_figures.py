@@ -179,6 +179,22 @@ def test_dendrogram_has_the_line_of_its_cut():
         assert line.get_ydata()[0] == cut.depth
 
 
+@pytest.mark.parametrize(("n_axes", "titles"), [(1, [""]), (2, ["$P = Q = 2$", "$P = Q = 3$"])])
+def test_judged_cells_are_diamonds_in_a_panel_for_each_value_of_the_first_axis(n_axes, titles):
+    made = outcome(n_axes)
+    cells = [{"triplet": CENTRES[i % 3].tolist()} for i in range(9)]
+    ground = {"triplets": CENTRES.tolist(), "labels": [0, 1, 2], "names": list(NAMES)}
+    curves = {"atlas": {"judges": {"diagonal": cells}, "background": ground}}
+    axes = list(made.axes)
+    if n_axes == 2:
+        axes[0] = ("$P = Q$", np.repeat([2, 3], [4, 5]))
+    panels = CURVE_FIGURES["atlas"](replace(made, curves=curves, axes=axes)).axes[: len(titles)]
+    for panel, title in zip(panels, titles, strict=True):
+        assert panel.get_title(loc="left").endswith(title)
+    diamonds = [len(panel.collections[-1].get_offsets()) for panel in panels]
+    assert diamonds == ([9] if n_axes == 1 else [4, 5])
+
+
 @pytest.mark.parametrize("n_axes", [0, 3])
 def test_classes_are_not_drawn_over_no_axis_or_three(n_axes):
     data = outcome(n_axes)
