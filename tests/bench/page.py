@@ -45,7 +45,7 @@ def text(results: Results) -> str:
             [row.words() for row in results.rows],
         )
     )
-    parts.append(_ERRORS)
+    parts += [_ERRORS, _WHY]
     if results.precision:
         parts += [_PICTURE]
     if results.scaling.nodes:
@@ -72,7 +72,7 @@ def text(results: Results) -> str:
              f"{f.efficiency:.1%}", f"{f.scheduler_load:.1%}" if f.scheduler_load else "none"]
             for name, f in results.forecasts
         ]  # fmt: skip
-        parts += [table(head, lines), _LIMITS]
+        parts += [table(head, lines), _AT_SCALE]
     return "\n\n".join(parts) + "\n"
 
 
@@ -140,6 +140,18 @@ interleaved turns, in each of which a contender runs for at least a second; one 
 are named. Machine: {machine}; load average at the
 start {load:.1f}."""
 
+_WHY = """\
+What limits it:
+
+* Steps of 50 nodes in lanes stay in the first cache. Eight trajectories of 500 nodes, of the
+  networked model above all, work from the second one; from about 800 nodes on one trajectory at a
+  time goes along the ring; from some 20,000 its stages come from the third cache or from memory.
+* Starting Python, the cluster and its workers, planning and the reduction take some seconds
+  whatever the number of points. Two processors that share a machine's memory and power are not
+  twice one: the bare blocks say how much they are.
+* A virtual machine may change its speed by half within seconds, and a median of five turns with
+  it. Rows near their target fall to either side from one call to the next."""
+
 _ERRORS = """\
 *Error* is the largest difference of u from a DOP853 solution at rtol 1e-13, up to t = 20
 (later, chaos has made everything of it). Peers run at rtol 1e-6; ours runs at the loosest
@@ -165,7 +177,7 @@ No such machine was at hand: this is a simulation of the run, fed with what was 
 {scheduler:.2f} ms a block of the scheduler's processor time, {ledger:.0f} ns a point to read
 the ledger."""
 
-_LIMITS = """\
+_AT_SCALE = """\
 With the scheduler, its one thread is the first bottleneck: it hands out a block in the time
 above, so that about (seconds a block) / (that time) cores can be fed. Job arrays (`slurm --mode
 array`) know no scheduler; what is lost there is the last block of each core and reading the

@@ -1,8 +1,8 @@
 """The fault harness: real processes, real signals, and a table of what became of the points.
 
-``scripts/faults --trials 20`` runs each fault 20 times at random moments; ``--only TEXT`` those
-with this text in their name; ``--seed`` chooses the moments; ``--jobs`` how many trials run at a
-time, for they mostly wait; ``--json FILE`` writes the table too.
+``scripts/faults --trials 20`` runs each fault 20 times at random moments; ``--only TEXT,...`` those
+with one of these texts in their name; ``--seed`` chooses the moments; ``--jobs`` how many trials
+run at a time, for they mostly wait; ``--json FILE`` writes the table too.
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ class Row:
 def main() -> int:
     """Run the faults that were asked for, and print the table; 1 when any trial went wrong."""
     args = _arguments()
-    names = [name for name in FAULTS if args.only.lower() in name.lower()]
+    texts = args.only.lower().split(",")
+    names = [name for name in FAULTS if any(text in name.lower() for text in texts)]
     if not names:
         print(f"no fault has {args.only!r} in its name; known: {', '.join(FAULTS)}")
         return 2
@@ -228,7 +229,8 @@ def _import_everything(folder: Path) -> None:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="scripts/faults", description=__doc__.splitlines()[0])
     parser.add_argument("--trials", type=int, default=2, help="trials a fault (default: 2)")
-    parser.add_argument("--only", default="", metavar="TEXT", help="faults with this in their name")
+    parser.add_argument("--only", default="", metavar="TEXT,...",
+                        help="faults with one of these in their name")  # fmt: skip
     parser.add_argument("--jobs", type=int, default=4, help="trials at a time (default: 4)")
     parser.add_argument("--seed", type=int, default=0, help="chooses the moments")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the table here too")
