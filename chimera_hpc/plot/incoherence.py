@@ -65,7 +65,8 @@ def _draw_strength(axes: Axes, panel: Strengths, label: str) -> None:
             label=name,
         )
     axes.set_ylim(-0.06, 1.06)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=bool(np.all(x == np.rint(x))), nbins=7))
+    whole = bool(np.all(x == np.rint(x)))
+    axes.xaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 3, 4, 5, 10], integer=whole))
     axes.set_xlabel(label)
     axes.set_title(panel.title)
 

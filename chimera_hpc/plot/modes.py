@@ -67,7 +67,7 @@ def draw_class_against(
         )
     axes.set_yticks(range(len(rows)), [style.spoken(name) for name in rows])
     axes.set_ylim(-0.6, len(rows) - 0.4)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=_whole(values), nbins=9))
+    axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 3, 5, 10], integer=_whole(values)))
     axes.set_xlabel(label)
     axes.grid(axis="y", color="#eeeeee")
 
