@@ -93,10 +93,8 @@ def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
     width = 2.0 * half + 1.0
     before_x, before_y = first_along(state, 0, n, half), first_along(state, n, n, half)
     for i in range(0, n, LANES):
-        change_x, change_y = (
-            changes_along(state, 0, n, half, i),
-            changes_along(state, n, n, half, i),
-        )
+        change_x = changes_along(state, 0, n, half, i)
+        change_y = changes_along(state, n, n, half, i)
         left = n - i
         x = load_at(state, i) if left >= LANES else load_some(state, i, 0, left)
         y = load_at(state, n + i) if left >= LANES else load_some(state, n + i, 0, left)

@@ -2,8 +2,8 @@
 
 The window slides once, in strides of eight nodes: the changes y_{i+P} - y_{i-P-1} add up within a
 stride (`simd.SCAN`), then to the window's sum before it. A step costs the same for every P, and
-eight nodes of one trajectory can go together (`slide_along`) as eight trajectories do
-(`slide_across`), with the same additions in the same order.
+eight nodes of one trajectory can go together (`changes_along`) as eight trajectories do
+(`stride_across`), with the same additions in the same order.
 """
 
 from __future__ import annotations

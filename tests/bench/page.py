@@ -99,7 +99,7 @@ def scaling_picture(scaling: Scaling) -> Figure:
     _measured(points, scaling.points, "two workers: points", "s, whole command", power=1, at=-1)
     whole = [(n, 1e6 * n * each) for n, each in scaling.nodes]
     _measured(nodes, whole, "P = 12: nodes", "µs a step and trajectory", power=1)
-    steps = [(half, 1e6 * each) for half, each in sorted(scaling.degrees)]
+    steps = [(half, 1e6 * each) for half, each in scaling.degrees]
     _measured(degrees, steps, "50 nodes: P", "µs a step and trajectory, in lanes", power=0)
     degrees.set_ylim(bottom=0)
     return figure
@@ -136,8 +136,8 @@ _HEAD = """# Measured performance
     scripts/bench --write
 
 measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
-interleaved turns, in each of which a contender runs for at least a second; one core unless workers
-are named. Machine: {machine}; load average at the
+interleaved turns, of at least a second for each contender where peers are in the row; one core
+unless workers are named. Machine: {machine}; load average at the
 start {load:.1f}."""
 
 _WHY = """\
