@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.errors import BadInput
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
+    from distributed import Client, SpecCluster
 
 LOOPBACK = "127.0.0.1"
 _WARNINGS = "PYTHONWARNINGS"
@@ -54,6 +54,8 @@ def settings(patience: float = 60.0) -> dict[str, Any]:
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
         "distributed.worker.memory.terminate": 0.95,
+        # Looking a hundred times a second at what the worker does takes its time.
+        "distributed.worker.profile.enabled": False,
         "distributed.admin.tick.limit": "1h",
     }
 
@@ -75,7 +77,8 @@ def local_cluster(
 ) -> Iterator[Client]:
     """Start one-thread worker processes on this machine and give a client of them.
 
-    Scheduler, workers and dashboard listen on the loopback interface only.
+    Scheduler and workers listen on the loopback interface only. They show no dashboards: loading
+    Bokeh would take each of these processes a second, and `status` and `watch` read the store.
 
     Parameters
     ----------
@@ -89,18 +92,24 @@ def local_cluster(
         Memory at which a worker is ended and replaced; a share of the machine's by default.
     """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, Nanny, Scheduler, SpecCluster
 
+    # An address is given for the dashboards that there are not: their server listens all the same.
+    listening = {"host": LOOPBACK, "dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}
+    worker = {
+        "cls": Nanny,
+        "options": {
+            **listening,
+            "nthreads": 1,
+            "memory_limit": memory_limit,
+            "local_directory": None if scratch is None else str(scratch),
+            "silence_logs": logging.CRITICAL,
+        },
+    }
     with dask.config.set(settings(patience)), _quiet_tracker():
-        cluster = LocalCluster(
-            n_workers=workers or usable_cores(),
-            threads_per_worker=1,
-            processes=True,
-            host=LOOPBACK,
-            dashboard_address=f"{LOOPBACK}:0",
-            worker_dashboard_address=f"{LOOPBACK}:0",
-            memory_limit=memory_limit,
-            local_directory=None if scratch is None else str(scratch),
+        cluster = SpecCluster(
+            scheduler={"cls": Scheduler, "options": listening},
+            workers=dict.fromkeys(range(workers or usable_cores()), worker),
             silence_logs=logging.CRITICAL,
         )
         try:
@@ -178,7 +187,7 @@ def _prepare(client: Client) -> None:
         raise BadInput(f"the workers cannot use this package: {text}") from None
 
 
-def _close(cluster: LocalCluster) -> None:
+def _close(cluster: SpecCluster) -> None:
     """Close a cluster; one that does not close, as after a worker was lost, is left behind."""
     try:
         cluster.close(timeout=_CLOSE_SECONDS)
@@ -186,7 +195,7 @@ def _close(cluster: LocalCluster) -> None:
         _kill_workers(cluster)
 
 
-def _kill_workers(cluster: LocalCluster) -> None:
+def _kill_workers(cluster: SpecCluster) -> None:
     """End all workers at once: what they have in hand is given up."""
     for nanny in cluster.workers.values():
         nanny.auto_restart = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
@@ -15,6 +16,9 @@ _EXITS = """exit status:
   0 every point has a result; 1 some failed (listed); 2 bad input (one line);
   75 stopped in good order with more to do; 130 Ctrl-C
 """
+
+_OBJECTS = 50_000
+"""New objects after which Python looks for garbage."""
 
 
 def parser(program: str = "python -m chimera_hpc.sweep") -> ArgumentParser:
@@ -42,6 +46,8 @@ def parser(program: str = "python -m chimera_hpc.sweep") -> ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
+    # Most of what a command imports is no garbage: looking for some takes a tenth of a second.
+    gc.set_threshold(_OBJECTS)
     args = parser().parse_args(arguments)
     args.typed = sys.argv[1:] if arguments is None else list(arguments)
     args.parser_named = parser
@@ -58,4 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    status = main()
+    # Nor is it when Python ends, which would look through it once more.
+    gc.freeze()
+    sys.exit(status)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -54,6 +55,10 @@ class Manners(WorkerPlugin):
         if WORKER in os.environ:
             _leave_in_time(worker)
         _on(signal.SIGTERM, end)
+
+    def teardown(self, worker: Worker) -> None:
+        """Spare the end of the process the look through everything for garbage."""
+        gc.freeze()
 
 
 def _drop_work() -> None:

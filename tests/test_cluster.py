@@ -39,7 +39,7 @@ def test_cluster_that_does_not_close_is_left_behind_without_workers(
 ) -> None:
     with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as worker:
         stuck = Stuck(worker.pid)
-        monkeypatch.setattr("distributed.LocalCluster", lambda **options: stuck)
+        monkeypatch.setattr("distributed.SpecCluster", lambda **options: stuck)
         monkeypatch.setattr("distributed.Client", FakeClient)
         with local_cluster(1) as client:
             assert isinstance(client, FakeClient)
@@ -47,6 +47,16 @@ def test_cluster_that_does_not_close_is_left_behind_without_workers(
         assert worker.wait(timeout=30) == -signal.SIGKILL
     assert stuck.limits == [cluster._CLOSE_SECONDS]
     assert stuck.nanny.auto_restart is False
+
+
+def test_workers_load_no_dashboard_and_are_not_profiled() -> None:
+    with local_cluster(1) as client:
+        (found,) = client.run(_loaded_bokeh_and_profiled).values()
+    assert found == (False, False)
+
+
+def _loaded_bokeh_and_profiled(dask_worker: Any) -> tuple[bool, bool]:
+    return "bokeh" in sys.modules, "profile" in dask_worker.periodic_callbacks
 
 
 class FakeClient:

@@ -121,7 +121,6 @@ class Lanes:
         self.lane = aligned(K.LANE_ROWS, lanes)
         self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
         self.count[K.STATE] = K.IDLE
-        self.weights = aligned(method.stages, lanes)
         self.samples = np.zeros((lanes, control.n_samples, width))
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
@@ -166,7 +165,7 @@ class Lanes:
                 c.atol,
                 c.t_end,
             ),
-            *(c.max_steps, c.start, c.step, self.weights, self.samples, self.iterations),
+            *(c.max_steps, c.start, c.step, self.samples, self.iterations),
         )
         elapsed = time.perf_counter() - began
         if done == self.iterations:

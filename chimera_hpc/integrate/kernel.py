@@ -32,8 +32,8 @@ from chimera_hpc.integrate.simd import (
 from chimera_hpc.status import Status
 
 # Rows of the lanes' numbers, ``lane`` (LANE_ROWS, lanes).
-TIME, STEP, LOG_ERROR, ERROR_SUM, LOG_ERROR_NEW, TIME_NEW = 0, 1, 2, 3, 4, 5
-LANE_ROWS = 6
+TIME, STEP, LOG_ERROR, ERROR_SUM, LOG_ERROR_NEW, TIME_NEW, THETA = 0, 1, 2, 3, 4, 5, 6
+LANE_ROWS = 7
 # Rows of the lanes' counters, ``count`` (COUNT_ROWS, lanes).
 STATE, NEXT_SAMPLE, ACCEPTED, TRIED, REJECTED_LAST, IS_DUE = 0, 1, 2, 3, 4, 5
 COUNT_ROWS = 6
@@ -59,24 +59,25 @@ RIGHT_HAND_SIDE = types.void(_MATRIX, _MATRIX, _MATRIX, types.Array(types.int64,
 @jit()
 def _stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, out: Any) -> None:
     # out = y + h * sum_{j < s} a[s, j] k_j; spelled out up to six terms so that the compiler
-    # keeps the weights in registers.
+    # keeps the weights in registers. The rows go downwards, those of a right-hand side upwards:
+    # each finds in the cache what the other has left there.
     o0 = first
     if s == 1:
         a0 = a[s, 0]
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             store(out, i, load(h, y, i) + h * (a0 * load(h, k, o0 + i)))
         return
     o1 = units
     if s == 2:
         a0, a1 = a[s, 0], a[s, 1]
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
             store(out, i, load(h, y, i) + h * total)
         return
     o2 = 2 * units
     if s == 3:
         a0, a1, a2 = a[s, 0], a[s, 1], a[s, 2]
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
             total = total + a2 * load(h, k, o2 + i)
             store(out, i, load(h, y, i) + h * total)
@@ -84,7 +85,7 @@ def _stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, o
     o3 = 3 * units
     if s == 4:
         a0, a1, a2, a3 = a[s, 0], a[s, 1], a[s, 2], a[s, 3]
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
             total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
             store(out, i, load(h, y, i) + h * total)
@@ -92,7 +93,7 @@ def _stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, o
     o4 = 4 * units
     if s == 5:
         a0, a1, a2, a3, a4 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4]
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
             total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
             total = total + a4 * load(h, k, o4 + i)
@@ -101,13 +102,13 @@ def _stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, o
     o5 = 5 * units
     if s == 6:
         a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
             total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
             total = total + a4 * load(h, k, o4 + i) + a5 * load(h, k, o5 + i)
             store(out, i, load(h, y, i) + h * total)
         return
-    for i in range(units):
+    for i in range(units - 1, -1, -1):
         total = a[s, 0] * load(h, k, o0 + i)
         for j in range(1, s):
             total = total + a[s, j] * load(h, k, j * units + i)
@@ -125,7 +126,7 @@ def _squared_errors(
     if stages == 7:
         e0, e1, e2, e3, e4, e5, e6 = e[0], e[1], e[2], e[3], e[4], e[5], e[6]
         o1, o2, o3, o4, o5 = units, 2 * units, 3 * units, 4 * units, 5 * units
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = e0 * load(h, k, first + i) + e1 * load(h, k, o1 + i)
             total = total + e2 * load(h, k, o2 + i) + e3 * load(h, k, o3 + i)
             total = total + e4 * load(h, k, o4 + i) + e5 * load(h, k, o5 + i)
@@ -134,7 +135,7 @@ def _squared_errors(
             ratio = total / (atol + rtol * size)
             store(work, i, ratio * ratio)
     else:
-        for i in range(units):
+        for i in range(units - 1, -1, -1):
             total = e[0] * load(h, k, first + i)
             for j in range(1, stages - 1):
                 total = total + e[j] * load(h, k, j * units + i)
@@ -255,55 +256,70 @@ def _judge(lane: Any, count: Any, size: Any, t_end: Any) -> Any:
 
 
 @jit()
+def _weight(p: Any, j: Any, theta: Any) -> Any:
+    # Weight of stage j in the continuous extension, sum_d p[j, d] theta**(d + 1).
+    weight = splat(0.0)
+    for d in range(p.shape[1] - 1, -1, -1):
+        weight = (weight + p[j, d]) * theta
+    return weight
+
+
+@jit()
+def _between(
+    h: Any, y: Any, k: Any, first: Any, units: Any, p: Any, theta: Any, observed: Any, work: Any
+) -> None:
+    # State at time t + theta h of the step just made, by the continuous extension.
+    stages = p.shape[0]
+    last = units * (stages - 1) - first
+    weight = _weight(p, 0, theta)
+    for i in range(observed):
+        store(work, i, weight * load(h, k, first + i))
+    for j in range(1, stages - 1):
+        weight = _weight(p, j, theta)
+        for i in range(observed):
+            store(work, i, load(h, work, i) + weight * load(h, k, j * units + i))
+    weight = _weight(p, stages - 1, theta)
+    for i in range(observed):
+        total = load(h, work, i) + weight * load(h, k, last + i)
+        store(work, i, load(h, y, i) + h * total)
+
+
+@jit()
 def _sample(
     like: Any, h: Any, y: Any, k: Any, first: Any, units: Any, work: Any, lane: Any, count: Any,
-    p: Any, start: Any, step: Any, t_end: Any, weights: Any, samples: Any,
+    p: Any, start: Any, step: Any, t_end: Any, samples: Any,
 ) -> None:  # fmt: skip
-    # Values of the observed rows at the sampling times that the accepted steps cover, by the
-    # continuous extension; the lanes take their first, second, ... sample of the step together.
+    # Values of the observed rows at the sampling times that the accepted steps cover; the lanes
+    # take their first, second, ... sample of the step together.
     lanes = y.shape[1]
-    stages, degree = p.shape
     total, width = samples.shape[1:]
     observed = width // LANES if lanes == 1 else width
-    last = units * (stages - 1) - first
     while True:
         due = 0
         for m in range(lanes):
             at = count[NEXT_SAMPLE, m]
+            t = min(start + at * step, t_end)
             count[IS_DUE, m] = (
                 count[STATE, m] == RUNNING
                 and at < total
                 and lane[LOG_ERROR_NEW, m] <= 0.0
-                and min(start + at * step, t_end) <= lane[TIME_NEW, m]
+                and t <= lane[TIME_NEW, m]
             )
             due += count[IS_DUE, m]
+            # Lanes that are not due get the state before the step, which nobody reads.
+            lane[THETA, m] = 0.0
+            if count[IS_DUE, m] == 1:
+                lane[THETA, m] = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
         if due == 0:
             return
-        for m in range(lanes):
-            # Lanes that are not due get the state before the step, which nobody reads.
-            theta = 0.0
-            if count[IS_DUE, m] == 1:
-                t = min(start + count[NEXT_SAMPLE, m] * step, t_end)
-                theta = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
-            for j in range(stages):
-                weight = 0.0
-                for d in range(degree - 1, -1, -1):
-                    weight = (weight + p[j, d]) * theta
-                weights[j, m] = weight
-        for i in range(observed):
-            value = across(like, weights, 0) * load(h, k, first + i)
-            for j in range(1, stages - 1):
-                value = value + across(like, weights, j) * load(h, k, j * units + i)
-            value = value + across(like, weights, stages - 1) * load(h, k, last + i)
-            value = load(h, y, i) + h * value
-            if lanes == 1:
-                store_at(samples, count[NEXT_SAMPLE, 0] * width + i * LANES, value)
-            else:
-                store(work, i, value)
+        _between(h, y, k, first, units, p, across(like, lane, THETA), observed, work)
         for m in range(lanes):
             if count[IS_DUE, m] == 1:
                 at = count[NEXT_SAMPLE, m]
-                if lanes > 1:
+                if lanes == 1:
+                    for i in range(observed):
+                        store_at(samples, at * width + i * LANES, load(h, work, i))
+                else:
                     for i in range(width):
                         samples[m, at, i] = work[i, m]
                 count[NEXT_SAMPLE, m] = at + 1
@@ -345,7 +361,7 @@ def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps:
 def _advance(
     like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, work: Any, lane: Any,
     count: Any, size: Any, a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
-    max_steps: Any, start: Any, step: Any, weights: Any, samples: Any, iterations: Any,
+    max_steps: Any, start: Any, step: Any, samples: Any, iterations: Any,
 ) -> Any:  # fmt: skip
     rows, lanes = y.shape
     units = rows // LANES if lanes == 1 else rows
@@ -375,7 +391,7 @@ def _advance(
         _add_up(zero, work, units, lane)
         rejected = _judge(lane, count, size, t_end)
         _sample(
-            like, h, y, k, first_unit, units, work, lane, count, p, start, step, t_end, weights,
+            like, h, y, k, first_unit, units, work, lane, count, p, start, step, t_end,
             samples,
         )  # fmt: skip
         if rejected > 0:
@@ -412,27 +428,27 @@ _SIGNATURE = types.int64(
     *(_MATRIX, types.Array(types.int64, 2, "C"), types.int64),
     *(_MATRIX, _VECTOR, _MATRIX),
     *(types.float64, types.float64, types.float64, types.float64, types.int64),
-    *(types.float64, types.float64, _MATRIX, types.Array(types.float64, 3, "C"), types.int64),
+    *(types.float64, types.float64, types.Array(types.float64, 3, "C"), types.int64),
 )
 
 
 def _advance_one(  # type: ignore[no-untyped-def]
     rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol, t_end,
-    max_steps, start, step, weights, samples, iterations,
+    max_steps, start, step, samples, iterations,
 ):  # fmt: skip
     return _advance(
         0.0, rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol,
-        t_end, max_steps, start, step, weights, samples, iterations,
+        t_end, max_steps, start, step, samples, iterations,
     )  # fmt: skip
 
 
 def _advance_pack(  # type: ignore[no-untyped-def]
     rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol, t_end,
-    max_steps, start, step, weights, samples, iterations,
+    max_steps, start, step, samples, iterations,
 ):  # fmt: skip
     return _advance(
         splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol,
-        atol, t_end, max_steps, start, step, weights, samples, iterations,
+        atol, t_end, max_steps, start, step, samples, iterations,
     )  # fmt: skip
 
 
@@ -441,7 +457,7 @@ def advance(lanes: int) -> Any:
     """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
 
     ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, size, a, e, p,
-    order, rtol, atol, t_end, max_steps, start, step, weights, samples, iterations)`` tries at
+    order, rtol, atol, t_end, max_steps, start, step, samples, iterations)`` tries at
     most ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
     returns how many it tried. Lanes marked `FRESH` are started first: first derivative, first step
     size.

@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import exprel
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.integrate._jit import jit
@@ -251,6 +250,9 @@ class TopologicalFHN:
         -------
         shape (T, N1)
         """
+        # Here, since it takes a sixth of a second, which every worker would wait for.
+        from scipy.special import exprel
+
         gradient = self.topology.spread_to_links(self.topology.solve_laplacian(w.T))
         cycles_v0 = self.topology.cycle_part(v0)
         cycles_one = self.topology.cycle_part(np.ones(self.topology.n_links))
