@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from distributed import Client, SpecCluster
 
 LOOPBACK = "127.0.0.1"
+NO_DASHBOARD = ("--no-dashboard", "--dashboard-address", f"{LOOPBACK}:0")
+"""Of a worker process: loading Bokeh would take it a second. Its server listens all the same, so it
+is told where."""
 _WARNINGS = "PYTHONWARNINGS"
 _CLOSE_SECONDS = 30.0
 
@@ -94,7 +97,7 @@ def local_cluster(
     import dask
     from distributed import Client, Nanny, Scheduler, SpecCluster
 
-    # An address is given for the dashboards that there are not: their server listens all the same.
+    # As `NO_DASHBOARD` says it on a command line.
     listening = {"host": LOOPBACK, "dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}
     worker = {
         "cls": Nanny,

@@ -22,7 +22,7 @@ from chimera_hpc.features import (
     range_of,
     sigma,
 )
-from chimera_hpc.features.series import by_node, quantise
+from chimera_hpc.features.series import by_node, quantise, round_to
 from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.integrate.driver import Control, Outcome, Stopped, integrate
 from chimera_hpc.integrate.simd import LANES
@@ -144,10 +144,9 @@ def rounded(u: Array, dtype: str) -> Array:
     store.
     """
     if dtype == "int16":
-        steps: Array = u / SCALE
-        np.rint(steps, out=steps)
-        steps *= SCALE
-        return steps
+        out = np.empty(u.shape)
+        round_to(u, SCALE, out)
+        return out
     return u.astype(dtype).astype(np.float64)
 
 
@@ -228,7 +227,8 @@ class _Block:
         result.features[row] = features.as_array()
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
         if result.series is not None and self.keeps[row]:
-            self.keep(u, result.series[row])
+            # As it was sampled: to round twice gives the same, and the times are in their order.
+            self.keep(model.node_pair(outcome.samples)[0], result.series[row])
 
     def keep(self, u: Array, out: NDArray[Any]) -> None:
         if self.sweep.keep.dtype == "int16":
@@ -295,4 +295,7 @@ def warm_up(sweep: Sweep, points: Points) -> None:
     fourier_features(t, rows.T, clock=spec.clock, refine=spec.refine)
     order_parameter(rows.T, rows.T)
     local_sigma(rows.T, 1)
-    quantise(by_node(rows.T.copy().T, rows), SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))
+    # In the integrator's order: time by time.
+    samples = np.repeat(rows, 2, axis=0).T.copy().T
+    round_to(by_node(samples, np.empty(samples.shape))[:3], SCALE, np.empty(rows.shape))
+    quantise(samples[:3], SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))

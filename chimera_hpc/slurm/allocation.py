@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chimera_hpc.cluster import LOOPBACK, settings
+from chimera_hpc.cluster import LOOPBACK, NO_DASHBOARD, settings
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid.tables import Slurm
 from chimera_hpc.slurm.queue import KERNELS, is_of_this_node
@@ -82,7 +82,7 @@ def _workers(store: Path, address: list[str], wishes: Slurm, log: Path) -> Itera
     worker = [
         *(sys.executable, "-m", "distributed.cli.dask_worker", *address),
         *("--nthreads", "1", "--memory-limit", limit, "--death-timeout", "60"),
-        *("--dashboard-address", f"{LOOPBACK}:0"),
+        *NO_DASHBOARD,
         *(["--interface", wishes.interface] if wishes.interface else []),
     ]
     with log.open("ab") as out:

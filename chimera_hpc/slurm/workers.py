@@ -22,7 +22,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chimera_hpc.cluster import LOOPBACK, settings
+from chimera_hpc.cluster import LOOPBACK, NO_DASHBOARD, settings
 from chimera_hpc.errors import BadInput
 from chimera_hpc.grid.tables import Slurm
 from chimera_hpc.slurm import queue
@@ -251,7 +251,7 @@ def _cluster(wishes: Slurm, name: str, store: Path, certificate: Certificate) ->
         log_directory=str(store.parent / LOGS),
         job_script_prologue=prologue,
         job_extra_directives=["--requeue", "--open-mode=append", *wishes.extra],
-        worker_extra_args=["--dashboard-address", f"{LOOPBACK}:0"],
+        worker_extra_args=list(NO_DASHBOARD),
         scheduler_options=options,
         security=certificate.security(),
         silence_logs=logging.CRITICAL,
@@ -260,7 +260,7 @@ def _cluster(wishes: Slurm, name: str, store: Path, certificate: Certificate) ->
 
 def worker_settings() -> list[str]:
     """Return the shell lines that give a worker in another job Dask's settings."""
-    chosen = {k: v for k, v in settings().items() if k.startswith("distributed.worker.memory")}
+    chosen = {k: v for k, v in settings().items() if k.startswith("distributed.worker.")}
     names = {k: "DASK_" + k.upper().replace(".", "__") for k in chosen}
     return [f"export {names[k]}={v}" for k, v in chosen.items()]
 

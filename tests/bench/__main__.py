@@ -36,7 +36,7 @@ PARTS = (
     "reduction",
     "projection",
 )
-TINY = Sizes((4,), 2.0, 1.0, 1, 0.0, (50, 100), 40, False)
+TINY = Sizes((4,), 2.0, 1.0, 1, 0.0, 1, (50, 100), 40, False)
 
 
 def main() -> int:

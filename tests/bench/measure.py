@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import statistics
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -68,6 +69,12 @@ def multiplication_rate(n: int = 1024, repeats: int = 7) -> float:
     a, b, c = rng.random((n, n)), rng.random((n, n)), np.empty((n, n))
     timing = interleaved({"dgemm": lambda: np.matmul(a, b, out=c)}, repeats)["dgemm"]
     return 2.0 * n**3 / min(timing.seconds)
+
+
+def second_cache() -> int:
+    """Return the bytes of a core's second cache."""
+    words = ["getconf", "LEVEL2_CACHE_SIZE"]
+    return int(subprocess.run(words, capture_output=True, check=True, text=True).stdout)
 
 
 def machine() -> str:

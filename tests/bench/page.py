@@ -136,19 +136,20 @@ _HEAD = """# Measured performance
     scripts/bench --write
 
 measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
-interleaved turns, of at least a second for each contender where peers are in the row; one core
-unless workers are named. Machine: {machine}; load average at the
+interleaved turns, of at least a second for each contender where peers are in the row; means of
+whole commands and bare blocks that take turns there and back; one core unless workers are named.
+Machine: {machine}; load average at the
 start {load:.1f}."""
 
 _WHY = """\
 What limits it:
 
-* Steps of 50 nodes in lanes stay in the first cache. Eight trajectories of 500 nodes, of the
-  networked model above all, work from the second one; from about 800 nodes on one trajectory at a
-  time goes along the ring; from some 20,000 its stages come from the third cache or from memory.
-* Starting Python, the cluster and its workers, planning and the reduction take some seconds
-  whatever the number of points. Two processors that share a machine's memory and power are not
-  twice one: the bare blocks say how much they are.
+* Eight trajectories of 50 nodes fill the first cache and a little more, of 500 nodes a part of the
+  second one: that, and the work on two variables, is what limits the networked model. From about
+  800 nodes on one trajectory at a time goes along the ring; from some 20,000 its stages come from
+  the third cache or from memory.
+* Starting Python, the cluster and its workers, planning and the reduction take four to five seconds
+  whatever the number of points, and at the end one worker waits for the other's last block.
 * A virtual machine may change its speed by half within seconds, and a median of five turns with
   it. Rows near their target fall to either side from one call to the next."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Callable, Sequence
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import peers
-from measure import Timing, interleaved, multiplication_rate
+from measure import Timing, interleaved, multiplication_rate, second_cache
 from numpy.typing import NDArray
 from problems import Ring, error
 from scipy.integrate import solve_ivp
@@ -83,6 +82,8 @@ class Sizes:
     repeats: int = 5
     at_least: float = 1.0
     """Seconds that each contender is given in its turn."""
+    turns: int = 25
+    """Repeats of what takes tenths of a second, so that half a minute is looked at."""
     nodes: Sequence[int] = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 30_000, 100_000)
     steps: int = 4000
     with_jax: bool = True
@@ -220,7 +221,7 @@ def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[floa
 
 def _by_cache(costs: Sequence[tuple[int, float]]) -> dict[str, list[tuple[int, float]]]:
     """Return the costs of rings by where their state is and how many go side by side."""
-    second = os.sysconf("SC_LEVEL2_CACHE_SIZE")
+    second = second_cache()
     stages = METHODS["tsit5"].stages
     parts: dict[str, list[tuple[int, float]]] = {}
     for n, cost in costs:
@@ -240,7 +241,7 @@ def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
     dgemm = multiplication_rate()
     long = 10 * sizes.steps
     halves = (1, 3, 6, 12, 18, 24)
-    found = lane_steps([(50, half, long) for half in halves], sizes.repeats)
+    found = lane_steps([(50, half, long) for half in halves], sizes.turns)
     costs = dict(zip(halves, found, strict=True))
     share = FLOPS_PER_NODE * 50 / costs[12] / dgemm
     note = f"{1e6 * costs[12]:.3f} us a lane-step; dgemm {dgemm / 1e9:.1f} GFlop/s"
@@ -250,7 +251,7 @@ def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
     ratio = costs[24] / costs[3]
     rows.append(Row("a step at P = 24 over one at P = 3", ratio, "", 1.1, False, note))
     rings = [(n, 12, max(sizes.steps * 50 // n, 20)) for n in sizes.nodes]
-    steps = lane_steps(rings, sizes.repeats)
+    steps = lane_steps(rings, sizes.turns)
     scaling.nodes = [(n, cost / n) for n, cost in zip(sizes.nodes, steps, strict=True)]
     note = ", ".join(f"{n}: {1e9 * cost:.2f} ns" for n, cost in scaling.nodes)
     what = "cost of a node and step, dearest ring over the one of 50"
@@ -273,7 +274,7 @@ def features(sizes: Sizes) -> list[Row]:
     text += f"[features]\nstart = {950.0 if sizes.steps > 1000 else 10.0}\n"
     sweep = Sweep.from_toml_text(text)
     points = sweep.points()
-    runs = [_whole_and_measuring(sweep, points) for _ in range(sizes.repeats + 1)][1:]
+    runs = [_whole_and_measuring(sweep, points) for _ in range(sizes.turns + 1)][1:]
     share = statistics.median(measuring / (whole - measuring) for whole, measuring in runs)
     each = [1e3 * statistics.median(times) / len(points) for times in zip(*runs, strict=True)]
     note = f"{each[1]:.2f} ms of {each[0]:.2f} ms a trajectory"

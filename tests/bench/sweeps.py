@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import statistics
 import subprocess
@@ -11,7 +12,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import psutil
@@ -49,6 +50,8 @@ class Watched:
     """Most memory that a process of it held, bytes."""
     first: float
     """Seconds until the first finished point; NaN where none was waited for."""
+    blocks: float = float("nan")
+    """Seconds that the workers of a sweep spent in its blocks, all together."""
 
 
 def watched(
@@ -116,7 +119,8 @@ def workers(
         if is_whole:
             out = folder / f"plane-{n}-{len(whole[n])}"
             command = [*_SWEEP, "run", str(PLANE), "--workers", str(n), "--out", str(out), *options]
-            whole[n].append(watched([*command, "--no-figures"]))
+            run = watched([*command, "--no-figures"])
+            whole[n].append(replace(run, blocks=_in_blocks(out / "run.log")))
         else:
             without[n].append(bare(PLANE, n, settings))
     runs = {n: statistics.mean(run.seconds for run in found) for n, found in whole.items()}
@@ -126,7 +130,13 @@ def workers(
     cost = {n: runs[n] / alone[n] - 1.0 for n in (1, 2)}
     note = f"{runs[1]:.1f} s and {runs[2]:.1f} s; "
     note += f"without executor and store {alone[1]:.1f} s and {alone[2]:.1f} s ({limit:.2f} times)"
-    both = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%}: start, planning, reduction included"
+    both = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%}: start, planning, reduction included; "
+    within = {
+        n: sum(run.seconds for run in found) / sum(run.blocks / n for run in found) - 1.0
+        for n, found in whole.items()
+    }
+    both += "over the seconds that its own workers spent in blocks, whatever the machine's speed "
+    both += f"from one run to the next, {within[1]:.1%} and {within[2]:.1%}"
     size = _points(folder / "plane")
     peak = max(run.peak for run in whole[2])
     scaling.workers = list(runs.items())
@@ -138,6 +148,10 @@ def workers(
         Row(f"the {size}-point plane, 2 workers, figures included", full.seconds / 60, "minutes",
             6.0, False),
     ]  # fmt: skip
+
+
+def _in_blocks(log: Path) -> float:
+    return sum(map(float, re.findall(r"block \d+: .* failed, ([0-9.]+) s", log.read_text())))
 
 
 def _points(out: Path) -> int:

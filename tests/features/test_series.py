@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from chimera_hpc.features.series import quantise
+from chimera_hpc.features.series import quantise, round_to
 from chimera_hpc.layout import MISSING, SCALE, encode_series
 
 
@@ -74,3 +74,14 @@ def test_series_equals_the_slow_one_sample_by_sample(rows):
 def test_a_row_that_is_not_contiguous_is_read_where_it_is():
     wide = np.random.default_rng(0).uniform(-2, 2, (3, 400))
     np.testing.assert_array_equal(quantised(wide[:, ::2]), encode_series(wide[:, ::2].T, np.int16))
+
+
+@given(hnp.arrays(np.float64, (2, 60), elements=st.floats(-4, 4)))
+def test_rounded_twice_is_rounded_once(rows):
+    rounded = np.empty(rows.shape)
+    round_to(rows, SCALE, rounded)
+    np.testing.assert_array_equal(rounded, np.rint(rows / SCALE) * SCALE)
+    again = np.empty(rows.shape)
+    round_to(rounded, SCALE, again)
+    np.testing.assert_array_equal(again, rounded)
+    np.testing.assert_array_equal(quantised(rounded), quantised(rows))
