@@ -63,7 +63,7 @@ def stay_on_one_core() -> None:
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def multiplication_rate(n: int = 1024, repeats: int = 7) -> float:
+def multiplication_rate(n: int = 1024, repeats: int = 60) -> float:
     """Return the floating-point operations a second of dgemm on one core: 2 n^3 over its time."""
     rng = np.random.default_rng(0)
     a, b, c = rng.random((n, n)), rng.random((n, n)), np.empty((n, n))

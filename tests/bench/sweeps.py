@@ -107,11 +107,13 @@ def workers(
 ) -> list[Row]:
     """The plane with one worker and with two, and its blocks without executor and store."""
     options = [word for setting in settings for word in ("--set", setting)]
-    for n in seeds:
-        out = folder / f"plane-seeds-{n}"
+    # The first run is not measured: it may have to compile the kernels.
+    for k, n in enumerate((seeds[0], *seeds)):
+        out = folder / f"plane-seeds-{n}-{k}"
         command = [*_SWEEP, "run", str(PLANE), "--out", str(out), *options, "--set", f"seeds={n}"]
         seconds = watched([*command, "--workers", "2", "--no-figures"]).seconds
-        scaling.points.append((_points(out), seconds))
+        if k > 0:
+            scaling.points.append((_points(out), seconds))
     whole: dict[int, list[Watched]] = {1: [], 2: []}
     without: dict[int, list[float]] = {1: [], 2: []}
     # There and back again: a machine that slows down or speeds up meets both sides alike.
