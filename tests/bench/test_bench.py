@@ -33,7 +33,7 @@ def test_every_part_runs_and_leaves_a_page(tmp_path):
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     rows = json.loads(out.read_text())
-    assert len(rows) == 16
+    assert len(rows) == 17
     assert all(np.isfinite(row["value"]) for row in rows)
     assert "10 million points" in (tmp_path / "performance.md").read_text()
     for name in ("performance", "scaling"):
