@@ -75,13 +75,14 @@ class Replay:
 
 def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
     """Compute points of a store anew, all at once; their bits do not depend on one another."""
-    from chimera_hpc.task import rounded, run_block
+    from chimera_hpc.task import run_block, store_as
 
     which = np.asarray(chosen, dtype=np.int64)
     signals: dict[int, tuple[Array, Array]] = {}
 
     def keep(row: int, u: Array, w: Array) -> None:
-        signals[row] = rounded(u, store.sweep.keep.dtype).T.copy(), w.T.copy()
+        stored = np.empty(u.shape[::-1], dtype=store.sweep.keep.dtype)
+        signals[row] = store_as(u, stored, np.empty(u.shape)).T.copy(), w.T.copy()
 
     made = run_block(store.sweep, store.points[which], on_signals=keep)
     ledger, names, times = store.ledger(), classes_of(store), sample_times(store.sweep)

@@ -136,18 +136,25 @@ def _lane_groups(models: list[Model]) -> Iterator[list[int]]:
     yield from groups.values()
 
 
-def rounded(u: Array, dtype: str) -> Array:
-    """Return a signal as a store of this type gives it back, beyond the range of int16 too.
+def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
+    """Write a signal (N, T) as a store keeps it, and return what the store gives back, in `back`.
 
     What is measured is what is stored: a maximum between two nearly equal samples would otherwise
     move to the other one, and its window with it, when the features are computed anew from the
-    store.
+    store. Values beyond the range of int16, which the store does not keep, are rounded alike.
+
+    Parameters
+    ----------
+    u, back : shape (N, T)
+    stored : shape (T, N)
+        In the type of the store.
     """
-    if dtype == "int16":
-        out = np.empty(u.shape)
-        round_to(u, SCALE, out)
-        return out
-    return u.astype(dtype).astype(np.float64)
+    if stored.dtype != np.int16:
+        stored[:] = u.T
+        back[:] = stored.T
+    elif quantise(u, SCALE, MISSING, stored, back):
+        round_to(by_node(u, back), SCALE, back)
+    return back
 
 
 class _Block:
@@ -163,7 +170,10 @@ class _Block:
         ]
         self.keeps = series_mask(sweep, points.columns["seed"])
         self.result = _empty_result(sweep, n)
-        self.rows = np.empty((0, 0))  # of the run being measured, one after the other
+        # Of the run being measured: u as stored, u and w node by node.
+        shape = (sweep.n_nodes, len(times))
+        self.stored = np.empty(shape[::-1], dtype=sweep.keep.dtype)
+        self.u, self.w = np.empty(shape), np.empty(shape)
 
     def integrate(
         self,
@@ -217,24 +227,17 @@ class _Block:
             self.on_signals(row, *model.node_pair(outcome.samples))
         if outcome.status is not Status.DONE:
             return
-        if self.rows.shape != outcome.samples.shape:
-            self.rows = np.empty(outcome.samples.shape)
-        u, w = model.node_pair(by_node(outcome.samples, self.rows))
-        u = rounded(u, self.sweep.keep.dtype)
+        u, w = model.node_pair(outcome.samples)
+        stored = self.stored
+        if result.series is not None and self.keeps[row]:
+            stored = result.series[row]
+        u = store_as(u, stored, self.u)
+        w = by_node(w, self.w)
         features = self.features(u)
         result.status[row] = features.status
         result.n_windows[row] = features.n_windows
         result.features[row] = features.as_array()
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
-        if result.series is not None and self.keeps[row]:
-            # As it was sampled: to round twice gives the same, and the times are in their order.
-            self.keep(model.node_pair(outcome.samples)[0], result.series[row])
-
-    def keep(self, u: Array, out: NDArray[Any]) -> None:
-        if self.sweep.keep.dtype == "int16":
-            quantise(u, SCALE, MISSING, out)
-        else:
-            out[:] = u.T
 
     def features(self, u: Array) -> FourierFeatures:
         spec = self.sweep.features
@@ -297,5 +300,7 @@ def warm_up(sweep: Sweep, points: Points) -> None:
     local_sigma(rows.T, 1)
     # In the integrator's order: time by time.
     samples = np.repeat(rows, 2, axis=0).T.copy().T
-    round_to(by_node(samples, np.empty(samples.shape))[:3], SCALE, np.empty(rows.shape))
-    quantise(samples[:3], SCALE, MISSING, np.empty((len(t), 3), dtype=np.int16))
+    back = np.empty(rows.shape)
+    stored = np.empty(back.shape[::-1], dtype=np.int16)
+    round_to(by_node(samples[:3], back), SCALE, back)
+    store_as(samples[:3], stored, back)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -146,17 +146,14 @@ class Topology:
         leaving = np.bincount(self.links[:, 0], minlength=self.n_nodes)
         return (arriving - leaving).astype(np.float64)
 
-    @cached_property
+    @property
     def laplacian_eigenvalues(self) -> Array:
-        r"""Eigenvalues of L0 = B1 B1^T, shape (N0,), in the order of the Fourier modes.
+        r"""Eigenvalues of L0 = B1 B1^T, shape (N0,), read-only, in the order of the Fourier modes.
 
         :math:`\Lambda_m = 2 \sum_{k=1}^{P} (1 - \cos(2 \pi m k / N_0))`: L0 is circulant and does
         not depend on the orientation.
         """
-        m = np.arange(self.n_nodes)[:, None]
-        k = np.arange(1, self.half_degree + 1)[None, :]
-        values: Array = 2.0 * (1.0 - np.cos(2.0 * np.pi * m * k / self.n_nodes)).sum(axis=1)
-        return values
+        return _eigenvalues(self.n_nodes, self.half_degree)
 
     def gather_links(self, v: Array) -> Array:
         """B1 v: what the nodes see of link signals v (N1, ...); returns (N0, ...)."""
@@ -178,3 +175,13 @@ class Topology:
     def cycle_part(self, v: Array) -> Array:
         """Projection of link signals v (N1,) on the cycle space, the kernel of B1."""
         return v - self.spread_to_links(self.solve_laplacian(self.gather_links(v)))
+
+
+# Every point of a sweep has a ring of its own; most are of a few sizes.
+@lru_cache(maxsize=64)
+def _eigenvalues(n_nodes: int, half_degree: int) -> Array:
+    m = np.arange(n_nodes)[:, None]
+    k = np.arange(1, half_degree + 1)[None, :]
+    values: Array = 2.0 * (1.0 - np.cos(2.0 * np.pi * m * k / n_nodes)).sum(axis=1)
+    values.flags.writeable = False
+    return values

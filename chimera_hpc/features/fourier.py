@@ -225,7 +225,8 @@ def window_lines(
         return _no_lines(n_nodes, deviation, Status.NO_WINDOW)
     table = np.full((n_nodes, first.shape[1], len(QUANTITIES)), np.nan)
     work = lines.work_arrays(int((last - first).max()) + 1)
-    _fill_lines(recording.x, first, last, counts, n_peaks - 1, refine == "sine-fit", work, table)
+    bins = np.full(n_nodes, n_peaks - 1)
+    _fill_lines(recording.x, first, last, counts, bins, refine == "sine-fit", work, table)
     values = np.ascontiguousarray(table.transpose(2, 0, 1))
     values[_FREQUENCY] /= 2.0 * np.pi * recording.dt
     if time_origin == "absolute":
@@ -277,18 +278,22 @@ def _deviations(x: Any, work: Any, out: Any) -> None:
 
 @jit()
 def _fill_lines(
-    x: Any, first: Any, last: Any, counts: Any, guess: int, refine: bool, work: Any, values: Any
+    x: Any, first: Any, last: Any, counts: Any, bins: Any, refine: bool, work: Any, values: Any
 ) -> None:
     """Lines of each row of x (N, T) in its windows into values (N, q, 4).
 
-    Frequencies are angles a sample; phases belong to the first sample and are not wrapped.
+    Frequencies are angles a sample; phases belong to the first sample and are not wrapped. bins
+    (N,) holds a guess at the dominant bin of each row, and in the end its bin in the last window.
     """
-    for j in range(x.shape[0]):
-        c = j % counts.size
-        k = guess
-        for m in range(counts[c]):
-            n = last[c, m] - first[c, m] + 1
-            k = lines.window_line(x[j], first[c, m], n, k, refine, work, values[j, m])
+    # Window by window: signals with one clock have windows of one length, whose rotations are kept.
+    for m in range(first.shape[1]):
+        for j in range(x.shape[0]):
+            c = j % counts.size
+            if m < counts[c]:
+                n = last[c, m] - first[c, m] + 1
+                bins[j] = lines.window_line(
+                    x[j], first[c, m], n, bins[j], refine, work, values[j, m]
+                )
 
 
 @jit()

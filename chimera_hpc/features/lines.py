@@ -24,10 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.integrate._jit import jit
+from chimera_hpc.integrate.simd import LANES as PACK
+from chimera_hpc.integrate.simd import fold, load_at, splat, store_at
 
 LANES = 16
 ROWS = 4
 BLOCK = LANES * ROWS
+# Bins whose rotations are kept at hand: the signals of a ring share their windows.
+SLOTS = 8
 
 # Largest relative rounding error that the energy balance of a window is trusted to have.
 _BALANCE = 1e-12
@@ -43,8 +47,8 @@ class Work(NamedTuple):
     z: NDArray[np.float64]  # centred samples, zero-padded to whole blocks
     z_s: NDArray[np.float64]  # the same times s, the place from the middle; for the sine fit
     power: NDArray[np.float64]  # |X_k|^2
-    turn: NDArray[np.float64]  # (2, LANES)
-    sums: NDArray[np.float64]  # (2, LANES)
+    turn: NDArray[np.float64]  # (SLOTS + 1, 3, LANES), see `_begin_turning`
+    sums: NDArray[np.float64]  # (LANES,)
 
 
 def work_arrays(longest: int) -> Work:
@@ -54,8 +58,8 @@ def work_arrays(longest: int) -> Work:
         np.empty(padded),
         np.empty(padded),
         np.empty(longest // 2 + 2),
-        np.empty((2, LANES)),
-        np.empty((2, LANES)),
+        np.zeros((SLOTS + 1, 3, LANES)),
+        np.empty(LANES),
     )
 
 
@@ -68,54 +72,104 @@ def centre(x: Any, first: int, n: int, z: Any, sums: Any) -> tuple[float, float,
     """
     origin = x[first]
     padded = (n + BLOCK - 1) // BLOCK * BLOCK
-    y = x[first : first + n]
-    for i in range(n):
-        z[i] = y[i] - origin
-    for i in range(n, padded):
-        z[i] = 0.0
-
-    acc = sums[0]
-    for b in range(LANES):
-        acc[b] = 0.0
+    whole = n // BLOCK * BLOCK
+    for i in range(whole, padded):
+        z[i] = x[first + i] - origin if i < n else 0.0
+    low, high = splat(0.0), splat(0.0)
     for start in range(0, padded, BLOCK):
-        y0 = z[start : start + LANES]
-        y1 = z[start + LANES : start + 2 * LANES]
-        y2 = z[start + 2 * LANES : start + 3 * LANES]
-        y3 = z[start + 3 * LANES : start + 4 * LANES]
-        for b in range(LANES):
-            acc[b] += (y0[b] + y1[b]) + (y2[b] + y3[b])
+        if start < whole:
+            for i in range(start, start + BLOCK, PACK):
+                store_at(z, i, load_at(x, first + i) - origin)
+        low = low + _four_rows(z, start)
+        high = high + _four_rows(z, start + PACK)
+    store_at(sums, 0, low)
+    store_at(sums, PACK, high)
     total, alternating = 0.0, 0.0
     for b in range(0, LANES, 2):
-        total += acc[b] + acc[b + 1]
-        alternating += acc[b] - acc[b + 1]
+        total += sums[b] + sums[b + 1]
+        alternating += sums[b] - sums[b + 1]
     mean = total / n
 
-    for i in range(n):
+    for i in range(whole, n):
         z[i] -= mean
-    for b in range(LANES):
-        acc[b] = 0.0
+    low, high = splat(0.0), splat(0.0)
     for start in range(0, padded, BLOCK):
-        y0 = z[start : start + LANES]
-        y1 = z[start + LANES : start + 2 * LANES]
-        y2 = z[start + 2 * LANES : start + 3 * LANES]
-        y3 = z[start + 3 * LANES : start + 4 * LANES]
-        for b in range(LANES):
-            acc[b] += (y0[b] * y0[b] + y1[b] * y1[b]) + (y2[b] * y2[b] + y3[b] * y3[b])
+        if start < whole:
+            for i in range(start, start + BLOCK, PACK):
+                store_at(z, i, load_at(z, i) - mean)
+        low = low + _four_squares(z, start)
+        high = high + _four_squares(z, start + PACK)
+    store_at(sums, 0, low)
+    store_at(sums, PACK, high)
     energy = 0.0
     for b in range(LANES):
-        energy += acc[b]
+        energy += sums[b]
     return origin + mean, energy, alternating
 
 
 @jit()
-def line_sums(z: Any, n: int, w: float, turn: Any, sums: Any) -> tuple[float, float]:
+def _four_rows(z: Any, start: int) -> Any:
+    y0, y1 = load_at(z, start), load_at(z, start + LANES)
+    y2, y3 = load_at(z, start + 2 * LANES), load_at(z, start + 3 * LANES)
+    return (y0 + y1) + (y2 + y3)
+
+
+@jit()
+def _four_squares(z: Any, start: int) -> Any:
+    y0, y1 = load_at(z, start), load_at(z, start + LANES)
+    y2, y3 = load_at(z, start + 2 * LANES), load_at(z, start + 3 * LANES)
+    return (y0 * y0 + y1 * y1) + (y2 * y2 + y3 * y3)
+
+
+@jit()
+def _weighted(z: Any, start: int, a0: float, a1: float, a2: float, a3: float) -> Any:
+    y0, y1 = load_at(z, start), load_at(z, start + LANES)
+    y2, y3 = load_at(z, start + 2 * LANES), load_at(z, start + 3 * LANES)
+    return (y0 * a0 + y1 * a1) + (y2 * a2 + y3 * a3)
+
+
+@jit()
+def line_sums(z: Any, n: int, w: float, turn: Any) -> tuple[float, float]:
     """C = sum z_i cos(w i) and S = sum z_i sin(w i), i = 0 .. n-1.
 
     With i = LANES a + b and the addition theorem, only cos and sin of w b and of w LANES a are
     needed, which come from one cosine and one sine by rotations.
     """
+    _begin_turning(w, turn[SLOTS])
+    c, s = _turning_sums(z, n, turn[SLOTS])
+    return c, s
+
+
+@jit()
+def _turning_sums(z: Any, n: int, turn: Any) -> tuple[float, float]:
+    c, s = turn[2, 0], turn[2, 1]
+    # (c_r, s_r) is the angle of row r of a block; (c, s) turns by one row, (c4, s4) by a block
+    c2, s2 = c * c - s * s, 2.0 * c * s
+    c4, s4 = c2 * c2 - s2 * s2, 2.0 * c2 * s2
+    c0, s0 = 1.0, 0.0
+    c1, s1 = c, s
+    c3, s3 = c2 * c - s2 * s, s2 * c + c2 * s
+    p_low, p_high, q_low, q_high = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    for start in range(0, n, BLOCK):
+        p_low = p_low + _weighted(z, start, c0, c1, c2, c3)
+        q_low = q_low + _weighted(z, start, s0, s1, s2, s3)
+        p_high = p_high + _weighted(z, start + PACK, c0, c1, c2, c3)
+        q_high = q_high + _weighted(z, start + PACK, s0, s1, s2, s3)
+        c0, s0 = c0 * c4 - s0 * s4, s0 * c4 + c0 * s4
+        c1, s1 = c1 * c4 - s1 * s4, s1 * c4 + c1 * s4
+        c2, s2 = c2 * c4 - s2 * s4, s2 * c4 + c2 * s4
+        c3, s3 = c3 * c4 - s3 * s4, s3 * c4 + c3 * s4
+    co_low, co_high = load_at(turn, 0), load_at(turn, PACK)
+    si_low, si_high = load_at(turn, LANES), load_at(turn, LANES + PACK)
+    along = (p_low * co_low - q_low * si_low) + (p_high * co_high - q_high * si_high)
+    across = (p_low * si_low + q_low * co_low) + (p_high * si_high + q_high * co_high)
+    return fold(along), fold(across)
+
+
+@jit()
+def _begin_turning(w: float, turn: Any) -> None:
+    """Write cos and sin of w b, b < LANES, into turn[0] and turn[1], of w LANES into turn[2]."""
     co, si = turn[0], turn[1]
-    p, q = sums[0], sums[1]
     c, s = math.cos(w), math.sin(w)
     co[0], si[0] = 1.0, 0.0
     m = 1
@@ -125,44 +179,17 @@ def line_sums(z: Any, n: int, w: float, turn: Any, sums: Any) -> tuple[float, fl
             si[m + b] = si[b] * c + co[b] * s
         c, s = c * c - s * s, 2.0 * c * s
         m *= 2
-    # (c_r, s_r) is the angle of row r of a block; (c, s) turns by one row, (c4, s4) by a block
-    c2, s2 = c * c - s * s, 2.0 * c * s
-    c4, s4 = c2 * c2 - s2 * s2, 2.0 * c2 * s2
-    c0, s0 = 1.0, 0.0
-    c1, s1 = c, s
-    c3, s3 = c2 * c - s2 * s, s2 * c + c2 * s
-    for b in range(LANES):
-        p[b] = 0.0
-        q[b] = 0.0
-    for start in range(0, n, BLOCK):
-        y0 = z[start : start + LANES]
-        y1 = z[start + LANES : start + 2 * LANES]
-        y2 = z[start + 2 * LANES : start + 3 * LANES]
-        y3 = z[start + 3 * LANES : start + 4 * LANES]
-        for b in range(LANES):
-            p[b] += (y0[b] * c0 + y1[b] * c1) + (y2[b] * c2 + y3[b] * c3)
-            q[b] += (y0[b] * s0 + y1[b] * s1) + (y2[b] * s2 + y3[b] * s3)
-        c0, s0 = c0 * c4 - s0 * s4, s0 * c4 + c0 * s4
-        c1, s1 = c1 * c4 - s1 * s4, s1 * c4 + c1 * s4
-        c2, s2 = c2 * c4 - s2 * s4, s2 * c4 + c2 * s4
-        c3, s3 = c3 * c4 - s3 * s4, s3 * c4 + c3 * s4
-    for b in range(LANES):
-        along = p[b]
-        p[b] = along * co[b] - q[b] * si[b]
-        q[b] = along * si[b] + q[b] * co[b]
-    m = LANES // 2
-    while m > 0:
-        for b in range(m):
-            p[b] += p[b + m]
-            q[b] += q[b + m]
-        m //= 2
-    return p[0], q[0]
+    turn[2, 0], turn[2, 1] = c, s
 
 
 @jit()
-def _bin_power(z: Any, n: int, k: int, turn: Any, sums: Any) -> float:
+def _bin_power(z: Any, n: int, k: int, turn: Any) -> float:
     """|X_k|^2 of the discrete Fourier transform of z."""
-    c, s = line_sums(z, n, 2.0 * math.pi * k / n, turn, sums)
+    mine = turn[k % SLOTS]
+    if mine[2, 2] != n or mine[2, 3] != k:
+        _begin_turning(2.0 * math.pi * k / n, mine)
+        mine[2, 2], mine[2, 3] = n, k
+    c, s = _turning_sums(z, n, mine)
     power: float = c * c + s * s
     return power
 
@@ -176,7 +203,6 @@ def dominant_bin(
     guess: int,
     power: Any,
     turn: Any,
-    sums: Any,
 ) -> int:
     """Bin k >= 1 with the largest |X_k|, the lowest of equal ones; fills power[k-1 : k+2].
 
@@ -202,7 +228,7 @@ def dominant_bin(
             low -= 1
             k = low
         down = not down
-        power[k] = _bin_power(z, n, k, turn, sums)
+        power[k] = _bin_power(z, n, k, turn)
         left -= power[k]
         if power[k] > best or (power[k] == best and k < at):
             best, at = power[k], k
@@ -210,7 +236,7 @@ def dominant_bin(
             break
     for k in range(max(at - 1, 1), min(at + 1, top) + 1):
         if k < low or k > high:
-            power[k] = _bin_power(z, n, k, turn, sums)
+            power[k] = _bin_power(z, n, k, turn)
     return at
 
 
@@ -237,9 +263,7 @@ def _kernel_sum(n: int, w: float) -> float:
 
 
 @jit()
-def fit_at(
-    z: Any, n: int, w: float, turn: Any, sums: Any
-) -> tuple[float, float, float, float, float]:
+def fit_at(z: Any, n: int, w: float, turn: Any) -> tuple[float, float, float, float, float]:
     """Least squares of A cos(w s) + B sin(w s) + K to the centred samples, 0 < w < pi.
 
     s = i - (n-1)/2 counts from the middle of the window: there the sine decouples from the other
@@ -247,7 +271,7 @@ def fit_at(
 
     Returns A, B, K, the energy the fit explains, and the angle w (n-1)/2 from start to middle.
     """
-    c, s = line_sums(z, n, w, turn, sums)
+    c, s = line_sums(z, n, w, turn)
     angle = 0.5 * (n - 1) * w
     cos_middle, sin_middle = math.cos(angle), math.sin(angle)
     c, s = c * cos_middle + s * sin_middle, s * cos_middle - c * sin_middle
@@ -259,15 +283,13 @@ def fit_at(
 
 
 @jit()
-def _newton_step(
-    z_s: Any, n: int, w: float, a: float, b: float, k: float, turn: Any, sums: Any
-) -> float:
+def _newton_step(z_s: Any, n: int, w: float, a: float, b: float, k: float, turn: Any) -> float:
     """Gauss-Newton step in w of the four-parameter sine fit; z_s holds s z.
 
     It is the coefficient of the model's derivative d = s (B cos(w s) - A sin(w s)) in the least
     squares of the residual over cos, sin, 1 and d.
     """
-    c, s = line_sums(z_s, n, w, turn, sums)
+    c, s = line_sums(z_s, n, w, turn)
     angle = 0.5 * (n - 1) * w
     cos_middle, sin_middle = math.cos(angle), math.sin(angle)
     c, s = c * cos_middle + s * sin_middle, s * cos_middle - c * sin_middle
@@ -303,7 +325,7 @@ def _kernel_derivatives(n: int, w: float) -> tuple[float, float, float]:
 
 
 @jit()
-def sine_fit(z: Any, z_s: Any, n: int, energy: float, w: float, turn: Any, sums: Any) -> float:
+def sine_fit(z: Any, z_s: Any, n: int, energy: float, w: float, turn: Any) -> float:
     """Angular frequency of the four-parameter sine fit (IEEE Std 1057), started at w.
 
     Gauss-Newton steps, halved as long as they explain less of the energy; they stay within one
@@ -312,13 +334,13 @@ def sine_fit(z: Any, z_s: Any, n: int, energy: float, w: float, turn: Any, sums:
     one_bin = 2.0 * math.pi / n
     lowest = max(w - one_bin, 0.5 * one_bin)
     highest = min(w + one_bin, math.pi - 0.5 * one_bin)
-    a, b, k, gain, _ = fit_at(z, n, w, turn, sums)
+    a, b, k, gain, _ = fit_at(z, n, w, turn)
     for _ in range(_MAX_STEPS):
-        step = _newton_step(z_s, n, w, a, b, k, turn, sums)
+        step = _newton_step(z_s, n, w, a, b, k, turn)
         accepted = False
         for _ in range(_MAX_HALVINGS):
             trial = min(max(w + step, lowest), highest)
-            a, b, k, new_gain, _ = fit_at(z, n, trial, turn, sums)
+            a, b, k, new_gain, _ = fit_at(z, n, trial, turn)
             # the gain is flat at its maximum: near it, rounding must not refuse a good step
             if new_gain >= gain - _BALANCE * energy:
                 accepted = True
@@ -345,7 +367,7 @@ def window_line(x: Any, first: int, n: int, guess: int, refine: bool, work: Any,
     if energy == 0.0:
         out[0], out[1], out[2], out[3] = 0.0, 0.0, 0.0, mean
         return guess
-    at: int = dominant_bin(z, n, energy, alternating, guess, power, turn, sums)
+    at: int = dominant_bin(z, n, energy, alternating, guess, power, turn)
     if 2 * at == n:
         # the sine vanishes at every sample: amplitude and sign of (-1)^i are all there is
         out[0], out[1], out[3] = abs(alternating) / n, math.pi, mean
@@ -357,8 +379,8 @@ def window_line(x: Any, first: int, n: int, guess: int, refine: bool, work: Any,
             z_s[i] = z[i] * (i - 0.5 * (n - 1))
         for i in range(n, (n + BLOCK - 1) // BLOCK * BLOCK):
             z_s[i] = 0.0
-        w = sine_fit(z, z_s, n, energy, w, turn, sums)
-    a, b, k, _, angle = fit_at(z, n, w, turn, sums)
+        w = sine_fit(z, z_s, n, energy, w, turn)
+    a, b, k, _, angle = fit_at(z, n, w, turn)
     out[0] = math.sqrt(a * a + b * b)
     out[1] = w
     out[2] = math.atan2(-b, a) - angle

@@ -121,7 +121,7 @@ class Lanes:
         self.lane = aligned(K.LANE_ROWS, lanes)
         self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
         self.count[K.STATE] = K.IDLE
-        self.samples = np.zeros((lanes, control.n_samples, width))
+        self.samples = np.empty((lanes, control.n_samples, width))
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:

@@ -8,13 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from chimera_hpc.features.series import quantise, round_to
+from chimera_hpc.features.series import by_node, quantise, round_to
 from chimera_hpc.layout import MISSING, SCALE, encode_series
 
 
 def quantised(rows):
     out = np.full(rows.shape[::-1], 12345, dtype=np.int16)
-    quantise(rows, SCALE, MISSING, out)
+    back = np.empty(rows.shape)
+    lost = quantise(rows, SCALE, MISSING, out, back)
+    assert lost == np.count_nonzero(out == MISSING)
+    np.testing.assert_array_equal(back.T, out * SCALE)
     return out
 
 
@@ -85,3 +88,27 @@ def test_rounded_twice_is_rounded_once(rows):
     round_to(rounded, SCALE, again)
     np.testing.assert_array_equal(again, rounded)
     np.testing.assert_array_equal(quantised(rounded), quantised(rows))
+
+
+SAMPLES = np.random.default_rng(1).uniform(-2, 2, (130, 12))
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        SAMPLES.T,
+        SAMPLES[:, 3:9].T,  # as the integrator leaves u, or w
+        SAMPLES[::2, :5].T,
+        SAMPLES[:1].T,
+        SAMPLES[:, ::2].T,  # not side by side in memory
+        SAMPLES[:, ::-1].T,
+        SAMPLES[::-1].T,
+        SAMPLES.T.copy(),
+        np.broadcast_to(SAMPLES[0], (130, 12)).T,
+    ],
+)
+def test_rows_of_any_layout_are_turned_and_quantised_alike(rows):
+    turned = by_node(rows, np.empty(rows.shape))
+    assert turned.flags.c_contiguous
+    np.testing.assert_array_equal(turned, rows)
+    np.testing.assert_array_equal(quantised(rows), encode_series(rows.T, np.int16))
