@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from dask.utils import parse_timedelta
 
 from chimera_hpc import cluster
 from chimera_hpc.cluster import local_cluster, settings
+from chimera_hpc.slurm.workers import worker_settings
 
 
 def test_worker_that_is_slow_to_come_back_is_not_given_up() -> None:
@@ -57,6 +59,28 @@ def test_workers_load_no_dashboard_and_are_not_profiled() -> None:
 
 def _loaded_bokeh_and_profiled(dask_worker: Any) -> tuple[bool, bool]:
     return "bokeh" in sys.modules, "profile" in dask_worker.periodic_callbacks
+
+
+def test_processes_are_seldom_asked_how_they_are() -> None:
+    # Dask's own defaults take five hundredths of a core from the driver and two from each worker.
+    with local_cluster(1) as client:
+        (worker,) = client.run(_milliseconds_between_looks).values()
+        (nanny,) = client.cluster.workers.values()
+        assert min(worker["tick"], worker["monitor"]) >= 5000
+        assert 500 <= nanny.periodic_callbacks["memory_monitor"].callback_time <= 1000
+
+
+def _milliseconds_between_looks(dask_worker: Any) -> dict[str, float]:
+    return {name: call.callback_time for name, call in dask_worker.periodic_callbacks.items()}
+
+
+def test_workers_in_other_jobs_get_the_settings_of_their_kind() -> None:
+    theirs = ("distributed.worker.", "distributed.admin.")
+    ours = {name: value for name, value in settings().items() if name.startswith(theirs)}
+    asked = f"import dask, distributed; print([dask.config.get(name) for name in {list(ours)}])"
+    script = "\n".join([*worker_settings(), f"exec {sys.executable} -c {shlex.quote(asked)}"])
+    shell = subprocess.run(["sh"], input=script, capture_output=True, text=True, check=True)
+    assert shell.stdout.strip() == str(list(ours.values()))
 
 
 class FakeClient:

@@ -260,8 +260,9 @@ def _cluster(wishes: Slurm, name: str, store: Path, certificate: Certificate) ->
 
 def worker_settings() -> list[str]:
     """Return the shell lines that give a worker in another job Dask's settings."""
-    chosen = {k: v for k, v in settings().items() if k.startswith("distributed.worker.")}
-    names = {k: "DASK_" + k.upper().replace(".", "__") for k in chosen}
+    theirs = ("distributed.worker.", "distributed.admin.")
+    chosen = {k: v for k, v in settings().items() if k.startswith(theirs)}
+    names = {k: "DASK_" + k.upper().replace(".", "__").replace("-", "_") for k in chosen}
     return [f"export {names[k]}={v}" for k, v in chosen.items()]
 
 
