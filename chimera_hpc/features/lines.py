@@ -185,6 +185,7 @@ def _begin_turning(w: float, turn: Any) -> None:
 @jit()
 def _bin_power(z: Any, n: int, k: int, turn: Any) -> float:
     """|X_k|^2 of the discrete Fourier transform of z."""
+    # Beside the rotations stands which length and bin they belong to.
     mine = turn[k % SLOTS]
     if mine[2, 2] != n or mine[2, 3] != k:
         _begin_turning(2.0 * math.pi * k / n, mine)
