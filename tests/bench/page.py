@@ -148,7 +148,7 @@ What limits it:
   second one: that, and the work on two variables, is what limits the networked model. From about
   800 nodes on one trajectory at a time goes along the ring; from some 20,000 its stages come from
   the third cache or from memory.
-* Starting Python, the cluster and its workers, planning and the reduction take four to five seconds
+* Starting Python, the cluster and its workers, planning and the reduction take some four seconds
   whatever the number of points, and at the end one worker waits for the other's last block.
 * A virtual machine may change its speed by half within seconds, and a median of five turns with
   it. Rows near their target fall to either side from one call to the next."""
