@@ -57,8 +57,8 @@ def settings(patience: float = 60.0) -> dict[str, Any]:
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
         "distributed.worker.memory.terminate": 0.95,
-        # What looks again and again how processes are doing takes up to two hundredths of a core in
-        # each of them, and more in the driver's, which has no core of its own.
+        # Looking many times a second how processes are doing takes time of the cores that
+        # integrate, in the driver's process most of all: it has no core of its own.
         "distributed.worker.profile.enabled": False,
         "distributed.worker.memory.monitor-interval": "500ms",
         "distributed.admin.system-monitor.interval": "10s",

@@ -62,7 +62,7 @@ def _loaded_bokeh_and_profiled(dask_worker: Any) -> tuple[bool, bool]:
 
 
 def test_processes_are_seldom_asked_how_they_are() -> None:
-    # Dask's own defaults take five hundredths of a core from the driver and two from each worker.
+    # Dask's own 20 ms and 500 ms take time of the cores that integrate.
     with local_cluster(1) as client:
         (worker,) = client.run(_milliseconds_between_looks).values()
         (nanny,) = client.cluster.workers.values()

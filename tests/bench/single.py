@@ -253,15 +253,14 @@ def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
     scaling.nodes = [(n, cost / n) for n, cost in zip(sizes.nodes, steps, strict=True)]
     note = ", ".join(f"{n}: {1e9 * cost:.2f} ns" for n, cost in scaling.nodes)
     # Caches make steps, which are shown: within each of them the cost of a node should be level.
-    parts = _by_cache(scaling.nodes)
-    for where, part in parts.items():
+    for where, part in _by_cache(scaling.nodes).items():
         costs_there = [cost for _, cost in part]
         what = "cost of a node and step, dearest ring over cheapest, "
         what += f"{part[0][0]} to {part[-1][0]} nodes"
         rows.append(Row(what, max(costs_there) / min(costs_there), "", 1.15, False, where))
     what = f"the same over all {len(scaling.nodes)} rings, steps from cache to cache included"
-    total = [cost for _, cost in scaling.nodes]
-    rows.append(Row(what, max(total) / min(total), "", None, False, note))
+    each = [cost for _, cost in scaling.nodes]
+    rows.append(Row(what, max(each) / min(each), "", None, False, note))
     return rows
 
 
