@@ -106,4 +106,4 @@ def fixed_steps(system, y0, counts, t_end, method, sampling=None):
         pool.run()
     assert list(pool.count[K.ACCEPTED]) == list(counts)
     samples = np.stack([pool.sampled(lane) for lane in range(LANES)])
-    return pool.y.copy(), samples
+    return pool.y[: pool.size].copy(), samples

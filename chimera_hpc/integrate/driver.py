@@ -94,10 +94,10 @@ class Stopped(Exception):
     """The caller asked to stop before every trajectory had ended."""
 
 
-def aligned(*shape: int) -> Array:
-    """Zeros that begin on a cache line, so that no vector load straddles two."""
+def aligned(*shape: int, fill: Callable[[int], Array] = np.zeros) -> Array:
+    """Zeros, or what `fill` gives, from the start of a cache line: no vector load straddles two."""
     size = int(np.prod(shape))
-    raw = np.zeros(size + 8)
+    raw = fill(size + 8)
     offset = (-raw.ctypes.data // 8) % 8
     return raw[offset : offset + size].reshape(shape)
 
@@ -107,21 +107,24 @@ class Lanes:
 
     def __init__(self, lanes: int, system: System, control: Control, n_observed: int) -> None:
         method = METHODS[control.method]
-        # One lane has its rows in packs, up to the last one: rows of zeros fill that.
+        # One lane has its rows in packs, up to the last one: rows of zeros fill that. Samples are
+        # written in packs from any number of lanes.
         self.size = system.n_rows
-        rows, width = (_in_packs(n) if lanes == 1 else n for n in (self.size, n_observed))
+        width = _in_packs(n_observed)
+        rows = _in_packs(self.size) if lanes == 1 else max(self.size, width)
         self.n_observed = n_observed
         self.control, self.method = control, method
         self.rhs, self.ints = system.right_hand_side, system.int_params
         self.advance = K.advance(lanes)
         self.params = aligned(len(system.lane_params), lanes)
         self.params[:] = system.lane_params[:, None]
-        self.y, self.y1, self.work = (aligned(rows, lanes) for _ in range(3))
+        self.y, self.y1 = aligned(rows, lanes), aligned(rows, lanes)
         self.k = aligned(method.stages * rows, lanes)
+        self.weights = aligned(method.stages, LANES)
         self.lane = aligned(K.LANE_ROWS, lanes)
         self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
         self.count[K.STATE] = K.IDLE
-        self.samples = np.empty((lanes, control.n_samples, width))
+        self.samples = aligned(lanes, control.n_samples, width, fill=np.empty)
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:
@@ -152,7 +155,7 @@ class Lanes:
         c, m = self.control, self.method
         began = time.perf_counter()
         done = self.advance(
-            *(self.rhs, self.params, self.ints, self.y, self.y1, self.k, self.work),
+            *(self.rhs, self.params, self.ints, self.y, self.y1, self.k, self.weights),
             *(
                 self.lane,
                 self.count,

@@ -27,7 +27,8 @@ from chimera_hpc.integrate.simd import (
     magnitude,
     splat,
     store,
-    store_at,
+    stream_at,
+    transposed,
 )
 from chimera_hpc.status import Status
 
@@ -116,65 +117,79 @@ def _stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, o
 
 
 @jit()
-def _squared_errors(
-    h: Any, y: Any, y1: Any, k: Any, first: Any, units: Any, e: Any, rtol: Any, atol: Any,
-    work: Any,
-) -> None:  # fmt: skip
-    # (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2, the terms of HNW eq. II.4.11.
-    stages = e.size
-    last = units * (stages - 1) - first
-    if stages == 7:
-        e0, e1, e2, e3, e4, e5, e6 = e[0], e[1], e[2], e[3], e[4], e[5], e[6]
-        o1, o2, o3, o4, o5 = units, 2 * units, 3 * units, 4 * units, 5 * units
-        for i in range(units - 1, -1, -1):
-            total = e0 * load(h, k, first + i) + e1 * load(h, k, o1 + i)
-            total = total + e2 * load(h, k, o2 + i) + e3 * load(h, k, o3 + i)
-            total = total + e4 * load(h, k, o4 + i) + e5 * load(h, k, o5 + i)
-            total = h * (total + e6 * load(h, k, last + i))
-            size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
-            ratio = total / (atol + rtol * size)
-            store(work, i, ratio * ratio)
-    else:
-        for i in range(units - 1, -1, -1):
-            total = e[0] * load(h, k, first + i)
-            for j in range(1, stages - 1):
-                total = total + e[j] * load(h, k, j * units + i)
-            total = h * (total + e[stages - 1] * load(h, k, last + i))
-            size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
-            ratio = total / (atol + rtol * size)
-            store(work, i, ratio * ratio)
+def _squared(total: Any, i: Any, context: Any) -> Any:
+    h, y, y1, _, _, _, _, rtol, atol = context
+    size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
+    ratio = h * total / (atol + rtol * size)
+    return ratio * ratio
 
 
 @jit()
-def _add_up(zero: Any, work: Any, units: Any, lane: Any) -> None:
+def _error_of_seven(i: Any, context: Any) -> Any:
+    h, _, _, k, first, units, (e0, e1, e2, e3, e4, e5, e6), _, _ = context
+    total = e0 * load(h, k, first + i) + e1 * load(h, k, units + i)
+    total = total + e2 * load(h, k, 2 * units + i)
+    total = total + e3 * load(h, k, 3 * units + i)
+    total = total + e4 * load(h, k, 4 * units + i)
+    total = total + e5 * load(h, k, 5 * units + i)
+    total = total + e6 * load(h, k, 6 * units - first + i)
+    return _squared(total, i, context)
+
+
+@jit()
+def _error_of_many(i: Any, context: Any) -> Any:
+    h, _, _, k, first, units, e, _, _ = context
+    last = e.size - 1
+    total = e[0] * load(h, k, first + i)
+    for j in range(1, last):
+        total = total + e[j] * load(h, k, j * units + i)
+    total = total + e[last] * load(h, k, last * units - first + i)
+    return _squared(total, i, context)
+
+
+@jit(inline="always")
+def _add_up(zero: Any, term: Any, context: Any, units: Any, lane: Any) -> None:
     # Sum over the rows, HNW eq. II.4.11 without the root: rows go to eight sums in turn, which
     # are then folded in halves. One lane has its eight sums side by side in a pack.
     if lane.shape[1] == 1:
-        total = load(zero, work, 0)
+        total = term(0, context)
         for i in range(1, units):
-            total = total + load(zero, work, i)
+            total = total + term(i, context)
         lane[ERROR_SUM, 0] = fold(total)
         return
     s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
     whole = units - units % 8
     for i in range(0, whole, 8):
-        s0 = s0 + load(zero, work, i)
-        s1 = s1 + load(zero, work, i + 1)
-        s2 = s2 + load(zero, work, i + 2)
-        s3 = s3 + load(zero, work, i + 3)
-        s4 = s4 + load(zero, work, i + 4)
-        s5 = s5 + load(zero, work, i + 5)
-        s6 = s6 + load(zero, work, i + 6)
-        s7 = s7 + load(zero, work, i + 7)
+        s0 = s0 + term(i, context)
+        s1 = s1 + term(i + 1, context)
+        s2 = s2 + term(i + 2, context)
+        s3 = s3 + term(i + 3, context)
+        s4 = s4 + term(i + 4, context)
+        s5 = s5 + term(i + 5, context)
+        s6 = s6 + term(i + 6, context)
+        s7 = s7 + term(i + 7, context)
     left = units - whole
-    s0 = s0 + load(zero, work, whole) if left > 0 else s0
-    s1 = s1 + load(zero, work, whole + 1) if left > 1 else s1
-    s2 = s2 + load(zero, work, whole + 2) if left > 2 else s2
-    s3 = s3 + load(zero, work, whole + 3) if left > 3 else s3
-    s4 = s4 + load(zero, work, whole + 4) if left > 4 else s4
-    s5 = s5 + load(zero, work, whole + 5) if left > 5 else s5
-    s6 = s6 + load(zero, work, whole + 6) if left > 6 else s6
+    s0 = s0 + term(whole, context) if left > 0 else s0
+    s1 = s1 + term(whole + 1, context) if left > 1 else s1
+    s2 = s2 + term(whole + 2, context) if left > 2 else s2
+    s3 = s3 + term(whole + 3, context) if left > 3 else s3
+    s4 = s4 + term(whole + 4, context) if left > 4 else s4
+    s5 = s5 + term(whole + 5, context) if left > 5 else s5
+    s6 = s6 + term(whole + 6, context) if left > 6 else s6
     store(lane, ERROR_SUM, ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))
+
+
+@jit()
+def _error_sum(
+    zero: Any, h: Any, y: Any, y1: Any, k: Any, first: Any, units: Any, e: Any, rtol: Any,
+    atol: Any, lane: Any,
+) -> None:  # fmt: skip
+    # Sum of (err_i / (atol + rtol max(|y_i|, |y1_i|)))**2 over the rows, HNW eq. II.4.11.
+    if e.size == 7:
+        e7 = (e[0], e[1], e[2], e[3], e[4], e[5], e[6])
+        _add_up(zero, _error_of_seven, (h, y, y1, k, first, units, e7, rtol, atol), units, lane)
+    else:
+        _add_up(zero, _error_of_many, (h, y, y1, k, first, units, e, rtol, atol), units, lane)
 
 
 @jit()
@@ -266,63 +281,105 @@ def _weight(p: Any, j: Any, theta: Any) -> Any:
 
 @jit()
 def _between(
-    h: Any, y: Any, k: Any, first: Any, units: Any, p: Any, theta: Any, observed: Any, work: Any
-) -> None:
-    # State at time t + theta h of the step just made, by the continuous extension.
-    stages = p.shape[0]
-    last = units * (stages - 1) - first
-    weight = _weight(p, 0, theta)
-    for i in range(observed):
-        store(work, i, weight * load(h, k, first + i))
+    h: Any, y: Any, k: Any, first: Any, units: Any, stages: Any, weights: Any, i: Any
+) -> Any:
+    # Row i of the state at time t + theta h of the step just made, by the continuous extension.
+    total = load(h, weights, 0) * load(h, k, first + i)
     for j in range(1, stages - 1):
-        weight = _weight(p, j, theta)
-        for i in range(observed):
-            store(work, i, load(h, work, i) + weight * load(h, k, j * units + i))
-    weight = _weight(p, stages - 1, theta)
-    for i in range(observed):
-        total = load(h, work, i) + weight * load(h, k, last + i)
-        store(work, i, load(h, y, i) + h * total)
+        total = total + load(h, weights, j) * load(h, k, j * units + i)
+    last = units * (stages - 1) - first
+    total = total + load(h, weights, stages - 1) * load(h, k, last + i)
+    return load(h, y, i) + h * total
+
+
+@jit()
+def _tile_between(
+    h: Any, y: Any, k: Any, first: Any, units: Any, stages: Any, weights: Any, i: Any
+) -> Any:
+    # Rows i ... i + 7 of what `_between` gives, the weights read once for all of them.
+    w = load(h, weights, 0)
+    o = first + i
+    t0, t1 = w * load(h, k, o), w * load(h, k, o + 1)
+    t2, t3 = w * load(h, k, o + 2), w * load(h, k, o + 3)
+    t4, t5 = w * load(h, k, o + 4), w * load(h, k, o + 5)
+    t6, t7 = w * load(h, k, o + 6), w * load(h, k, o + 7)
+    for j in range(1, stages):
+        w = load(h, weights, j)
+        o = i + (j * units if j < stages - 1 else j * units - first)
+        t0, t1 = t0 + w * load(h, k, o), t1 + w * load(h, k, o + 1)
+        t2, t3 = t2 + w * load(h, k, o + 2), t3 + w * load(h, k, o + 3)
+        t4, t5 = t4 + w * load(h, k, o + 4), t5 + w * load(h, k, o + 5)
+        t6, t7 = t6 + w * load(h, k, o + 6), t7 + w * load(h, k, o + 7)
+    t0, t1 = load(h, y, i) + h * t0, load(h, y, i + 1) + h * t1
+    t2, t3 = load(h, y, i + 2) + h * t2, load(h, y, i + 3) + h * t3
+    t4, t5 = load(h, y, i + 4) + h * t4, load(h, y, i + 5) + h * t5
+    t6, t7 = load(h, y, i + 6) + h * t6, load(h, y, i + 7) + h * t7
+    return t0, t1, t2, t3, t4, t5, t6, t7
+
+
+@jit()
+def _due(lane: Any, count: Any, total: Any, start: Any, step: Any, t_end: Any) -> Any:
+    # Find the lanes whose accepted step covers their next sampling time, and where in the step.
+    due = 0
+    for m in range(lane.shape[1]):
+        at = count[NEXT_SAMPLE, m]
+        t = min(start + at * step, t_end)
+        count[IS_DUE, m] = (
+            count[STATE, m] == RUNNING
+            and at < total
+            and lane[LOG_ERROR_NEW, m] <= 0.0
+            and t <= lane[TIME_NEW, m]
+        )
+        due += count[IS_DUE, m]
+        # Lanes that are not due get the state before the step, which nobody reads.
+        lane[THETA, m] = 0.0
+        if count[IS_DUE, m] == 1:
+            lane[THETA, m] = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
+    return due
+
+
+@jit()
+def _keep(samples: Any, count: Any, m: Any, i: Any, values: Any) -> None:
+    # Rows i ... i + 7 of lane m's sample, where one is due.
+    if count[IS_DUE, m] == 1:
+        total, width = samples.shape[1:]
+        stream_at(samples, (m * total + count[NEXT_SAMPLE, m]) * width + i, values)
 
 
 @jit()
 def _sample(
-    like: Any, h: Any, y: Any, k: Any, first: Any, units: Any, work: Any, lane: Any, count: Any,
+    like: Any, h: Any, y: Any, k: Any, first: Any, units: Any, weights: Any, lane: Any, count: Any,
     p: Any, start: Any, step: Any, t_end: Any, samples: Any,
 ) -> None:  # fmt: skip
     # Values of the observed rows at the sampling times that the accepted steps cover; the lanes
     # take their first, second, ... sample of the step together.
     lanes = y.shape[1]
     total, width = samples.shape[1:]
-    observed = width // LANES if lanes == 1 else width
-    while True:
-        due = 0
+    stages = p.shape[0]
+    while _due(lane, count, total, start, step, t_end) > 0:
+        theta = across(like, lane, THETA)
+        for j in range(stages):
+            store(weights, j, _weight(p, j, theta))
+        if lanes == 1:
+            base = count[NEXT_SAMPLE, 0] * width
+            for i in range(width // LANES):
+                value = _between(h, y, k, first, units, stages, weights, i)
+                stream_at(samples, base + i * LANES, value)
+        else:
+            for i in range(0, width, LANES):
+                s0, s1, s2, s3, s4, s5, s6, s7 = transposed(
+                    *_tile_between(h, y, k, first, units, stages, weights, i)
+                )
+                _keep(samples, count, 0, i, s0)
+                _keep(samples, count, 1, i, s1)
+                _keep(samples, count, 2, i, s2)
+                _keep(samples, count, 3, i, s3)
+                _keep(samples, count, 4, i, s4)
+                _keep(samples, count, 5, i, s5)
+                _keep(samples, count, 6, i, s6)
+                _keep(samples, count, 7, i, s7)
         for m in range(lanes):
-            at = count[NEXT_SAMPLE, m]
-            t = min(start + at * step, t_end)
-            count[IS_DUE, m] = (
-                count[STATE, m] == RUNNING
-                and at < total
-                and lane[LOG_ERROR_NEW, m] <= 0.0
-                and t <= lane[TIME_NEW, m]
-            )
-            due += count[IS_DUE, m]
-            # Lanes that are not due get the state before the step, which nobody reads.
-            lane[THETA, m] = 0.0
-            if count[IS_DUE, m] == 1:
-                lane[THETA, m] = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
-        if due == 0:
-            return
-        _between(h, y, k, first, units, p, across(like, lane, THETA), observed, work)
-        for m in range(lanes):
-            if count[IS_DUE, m] == 1:
-                at = count[NEXT_SAMPLE, m]
-                if lanes == 1:
-                    for i in range(observed):
-                        store_at(samples, at * width + i * LANES, load(h, work, i))
-                else:
-                    for i in range(width):
-                        samples[m, at, i] = work[i, m]
-                count[NEXT_SAMPLE, m] = at + 1
+            count[NEXT_SAMPLE, m] += count[IS_DUE, m]
 
 
 @jit()
@@ -359,7 +416,7 @@ def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps:
 
 @jit()
 def _advance(
-    like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, work: Any, lane: Any,
+    like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, weights: Any, lane: Any,
     count: Any, size: Any, a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
     max_steps: Any, start: Any, step: Any, samples: Any, iterations: Any,
 ) -> Any:  # fmt: skip
@@ -387,11 +444,10 @@ def _advance(
             _stage_sum(h, y, k, first_unit, units, a, s, y1)
             o = last if s == stages - 1 else s * rows
             rhs(y1[:size], k[o : o + size], params, ints)
-        _squared_errors(h, y, y1, k, first_unit, units, e, rtol, atol, work)
-        _add_up(zero, work, units, lane)
+        _error_sum(zero, h, y, y1, k, first_unit, units, e, rtol, atol, lane)
         rejected = _judge(lane, count, size, t_end)
         _sample(
-            like, h, y, k, first_unit, units, work, lane, count, p, start, step, t_end,
+            like, h, y, k, first_unit, units, weights, lane, count, p, start, step, t_end,
             samples,
         )  # fmt: skip
         if rejected > 0:
@@ -433,21 +489,21 @@ _SIGNATURE = types.int64(
 
 
 def _advance_one(  # type: ignore[no-untyped-def]
-    rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol, t_end,
+    rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol, atol, t_end,
     max_steps, start, step, samples, iterations,
 ):  # fmt: skip
     return _advance(
-        0.0, rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol,
+        0.0, rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol, atol,
         t_end, max_steps, start, step, samples, iterations,
     )  # fmt: skip
 
 
 def _advance_pack(  # type: ignore[no-untyped-def]
-    rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol, atol, t_end,
+    rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol, atol, t_end,
     max_steps, start, step, samples, iterations,
 ):  # fmt: skip
     return _advance(
-        splat(0.0), rhs, params, ints, y, y1, k, work, lane, count, size, a, e, p, order, rtol,
+        splat(0.0), rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol,
         atol, t_end, max_steps, start, step, samples, iterations,
     )  # fmt: skip
 
@@ -456,7 +512,7 @@ def _advance_pack(  # type: ignore[no-untyped-def]
 def advance(lanes: int) -> Any:
     """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
 
-    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, work, lane, count, size, a, e, p,
+    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, weights, lane, count, size, a, e, p,
     order, rtol, atol, t_end, max_steps, start, step, samples, iterations)`` tries at
     most ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
     returns how many it tried. Lanes marked `FRESH` are started first: first derivative, first step

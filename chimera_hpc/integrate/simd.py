@@ -145,6 +145,14 @@ if _config.DISABLE_JIT:
         quarter = half[:2] + half[2:]
         return quarter[0] + quarter[1]
 
+    def stream_at(array: Any, offset: int, pack: Any) -> None:
+        """Write as `store_at` does, past the caches; the place must begin a cache line."""
+        store_at(array, offset, pack)
+
+    def transposed(*packs: Any) -> Any:
+        """Turn eight packs round: pack m of the result holds place m of each."""
+        return tuple(np.stack(packs).T.copy())
+
     def larger(a: Any, b: Any) -> Any:
         """Larger of two numbers, lane by lane; ``b`` where either is NaN."""
         return np.where(a > b, a, b) if np.ndim(a) else (a if a > b else b)
@@ -205,6 +213,18 @@ else:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             pointer = _pointer(context, builder, signature, args, "pack")
             builder.store(args[2], pointer, align=8)
+            return context.get_dummy_value()
+
+        return types.void(array, offset, pack), generate
+
+    @intrinsic
+    def stream_at(typing_context: Any, array: Any, offset: Any, pack: Any) -> Any:
+        """Write as `store_at` does, past the caches; the place must begin a cache line."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            pointer = _pointer(context, builder, signature, args, "pack")
+            write = builder.store(args[2], pointer, align=8 * LANES)
+            write.set_metadata("nontemporal", builder.module.add_metadata([ir.IntType(32)(1)]))
             return context.get_dummy_value()
 
         return types.void(array, offset, pack), generate
@@ -285,6 +305,30 @@ else:
             return builder.extract_element(total, ir.Constant(ir.IntType(32), 0))
 
         return types.float64(pack), generate
+
+    @intrinsic
+    def transposed(
+        typing_context: Any, p0: Any, p1: Any, p2: Any, p3: Any, p4: Any, p5: Any, p6: Any, p7: Any
+    ) -> Any:
+        """Turn eight packs round: pack m of the result holds place m of each."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            # Blocks of 1, 2, then 4 places change sides between packs that are as far apart.
+            packs = list(args)
+            for width in (1, 2, 4):
+                # Places of the lower and the upper pack of a pair; from 8 on they are the upper's.
+                low = [place & ~width | (LANES if place & width else 0) for place in range(LANES)]
+                high = [place + width for place in low]
+                kind = ir.VectorType(ir.IntType(32), LANES)
+                for j in range(LANES):
+                    if not j & width:
+                        pair = packs[j], packs[j + width]
+                        packs[j] = builder.shuffle_vector(*pair, ir.Constant(kind, low))
+                        packs[j + width] = builder.shuffle_vector(*pair, ir.Constant(kind, high))
+            return context.make_tuple(builder, signature.return_type, packs)
+
+        result = types.UniTuple(pack_type, LANES)  # type: ignore[no-untyped-call]
+        return result(p0, p1, p2, p3, p4, p5, p6, p7), generate
 
     @intrinsic
     def store(typing_context: Any, array: Any, row: Any, value: Any) -> Any:

@@ -23,6 +23,7 @@ from chimera_hpc.integrate.simd import (
 
 @jit()
 def _change(zero: Any, y: Any, row: Any, n: Any, half: Any, i: Any) -> Any:
+    # T_i - T_{i-1} = y_{i+P} - y_{i-P-1}
     ahead, behind = i + half, i - half - 1
     ahead = ahead - n if ahead >= n else ahead
     behind = behind + n if behind < 0 else behind
@@ -60,24 +61,35 @@ def first_across(zero: Any, y: Any, row: Any, n: Any, half: Any) -> Any:
     return ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7))
 
 
+@jit()
+def _change_anywhere(zero: Any, y: Any, window: Any, j: Any) -> Any:
+    row, n, half, i = window
+    return _change(zero, y, row, n, half, i + j)
+
+
+@jit()
+def _change_inside(zero: Any, y: Any, window: Any, j: Any) -> Any:
+    ahead, behind = window
+    return load(zero, y, ahead + j) - load(zero, y, behind + j)
+
+
 @jit(inline="always")
-def stride_across(
-    zero: Any, y: Any, row: Any, n: Any, half: Any, before: Any, i: Any, node: Any, context: Any
+def _stride(
+    zero: Any, y: Any, change: Any, window: Any, before: Any, i: Any, node: Any, context: Any
 ) -> Any:
-    """Call ``node(zero, j, T_j, context)`` for j = i ... i + 7, given T_{i-1}; returns T_{i+7}."""
-    x0 = _change(zero, y, row, n, half, i)
-    x1 = _change(zero, y, row, n, half, i + 1) + x0
+    x0 = change(zero, y, window, 0)
+    x1 = change(zero, y, window, 1) + x0
     node(zero, i, before + x0, context)
     node(zero, i + 1, before + x1, context)
-    x2 = _change(zero, y, row, n, half, i + 2)
-    x3 = _change(zero, y, row, n, half, i + 3) + x2
+    x2 = change(zero, y, window, 2)
+    x3 = change(zero, y, window, 3) + x2
     x2, x3 = x2 + x1, x3 + x1
     node(zero, i + 2, before + x2, context)
     node(zero, i + 3, before + x3, context)
-    x4 = _change(zero, y, row, n, half, i + 4)
-    x5 = _change(zero, y, row, n, half, i + 5) + x4
-    x6 = _change(zero, y, row, n, half, i + 6)
-    x7 = _change(zero, y, row, n, half, i + 7) + x6
+    x4 = change(zero, y, window, 4)
+    x5 = change(zero, y, window, 5) + x4
+    x6 = change(zero, y, window, 6)
+    x7 = change(zero, y, window, 7) + x6
     x6, x7 = x6 + x5, x7 + x5
     x4, x5, x6, x7 = x4 + x3, x5 + x3, x6 + x3, x7 + x3
     node(zero, i + 4, before + x4, context)
@@ -86,6 +98,21 @@ def stride_across(
     after = before + x7
     node(zero, i + 7, after, context)
     return after
+
+
+@jit(inline="always")
+def stride_across(
+    zero: Any, y: Any, row: Any, n: Any, half: Any, before: Any, i: Any, node: Any, context: Any
+) -> Any:
+    """Call ``node(zero, j, T_j, context)`` for j = i ... i + 7, given T_{i-1}; returns T_{i+7}."""
+    # Where neither end of the window passes the ring's end, rows follow each other: no wrapping.
+    ahead, behind = i + half, i - half - 1
+    ahead = ahead - n if ahead >= n else ahead
+    behind = behind + n if behind < 0 else behind
+    if max(ahead, behind) + 8 <= n:
+        window = row + ahead, row + behind
+        return _stride(zero, y, _change_inside, window, before, i, node, context)
+    return _stride(zero, y, _change_anywhere, (row, n, half, i), before, i, node, context)
 
 
 @jit(inline="always")

@@ -90,7 +90,7 @@ def test_position_in_the_pack_does_not_matter(lane):
     status, steps, n_sampled, y_end, samples = ALONE["reduced"][4]
     assert pool.count[K.STATE, lane] == status
     assert pool.count[K.ACCEPTED, lane] == steps
-    assert pool.y[:, lane].tobytes() == y_end
+    assert pool.y[: pool.size, lane].tobytes() == y_end
     assert pool.sampled(lane)[:, :n_sampled].tobytes() == samples
 
 

@@ -244,3 +244,25 @@ def test_a_sum_keeps_its_order_and_products_are_rounded():
 
 def test_kernels_do_the_same_without_compilation():
     assert python(RUN, NUMBA_DISABLE_JIT="1") == run_here() + "\n"
+
+
+RUN_PACK = """
+import numpy as np
+from chimera_hpc.integrate.driver import Control, integrate
+from chimera_hpc.models.networked_fhn import NetworkedFHN
+
+def run():
+    model, found = NetworkedFHN(11, 3), {}
+    states = [np.linspace(-1, 1, 22) * (1 + number) for number in range(3)]
+    integrate(
+        [model] * 3, states, Control(0.5, 0.0, 0.1, rtol=1e-4), 11,
+        lambda number, end: found.update({number: end.samples.tobytes().hex()}), lanes=8,
+    )
+    return " ".join(found[number] for number in range(3))
+"""
+
+
+def test_packs_do_the_same_without_compilation():
+    here = {}
+    exec(RUN_PACK, here)
+    assert python(RUN_PACK + "print(run())", NUMBA_DISABLE_JIT="1") == here["run"]() + "\n"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from kernel_tools import compiled
 
+from chimera_hpc.integrate.driver import aligned
 from chimera_hpc.integrate.simd import (
     LANES,
     across,
@@ -24,6 +25,8 @@ from chimera_hpc.integrate.simd import (
     store,
     store_at,
     store_some,
+    stream_at,
+    transposed,
 )
 
 # Numbers with which arithmetic goes wrong first, and some ordinary ones.
@@ -155,6 +158,27 @@ def test_packs_of_neighbouring_rows(low, high):
     assert (out[32:40, 0] == array[2, 0]).all()
     assert out[40, 0] == pytest.approx(rows.sum(), rel=1e-14)
     assert out[41, 0] == rows[7]
+
+
+def test_eight_packs_turn_round():
+    @numba.njit
+    def turn(a, out):
+        like = splat(0.0)
+        p0, p1, p2, p3 = load(like, a, 0), load(like, a, 1), load(like, a, 2), load(like, a, 3)
+        p4, p5, p6, p7 = load(like, a, 4), load(like, a, 5), load(like, a, 6), load(like, a, 7)
+        q0, q1, q2, q3, q4, q5, q6, q7 = transposed(p0, p1, p2, p3, p4, p5, p6, p7)
+        stream_at(out, 0, q0)
+        stream_at(out, 8, q1)
+        stream_at(out, 16, q2)
+        stream_at(out, 24, q3)
+        stream_at(out, 32, q4)
+        stream_at(out, 40, q5)
+        stream_at(out, 48, q6)
+        stream_at(out, 56, q7)
+
+    a, out = np.arange(64.0).reshape(8, 8), aligned(8, 8)
+    turn(a, out)
+    np.testing.assert_array_equal(out, a.T)
 
 
 def test_what_is_not_loaded_is_not_touched():
