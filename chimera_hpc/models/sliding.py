@@ -22,11 +22,15 @@ from chimera_hpc.integrate.simd import (
 
 
 @jit()
-def _change(zero: Any, y: Any, row: Any, n: Any, half: Any, i: Any) -> Any:
-    # T_i - T_{i-1} = y_{i+P} - y_{i-P-1}
+def _ends(n: Any, half: Any, i: Any) -> Any:
+    # Nodes that come and go: T_i - T_{i-1} = y_{i+P} - y_{i-P-1}.
     ahead, behind = i + half, i - half - 1
-    ahead = ahead - n if ahead >= n else ahead
-    behind = behind + n if behind < 0 else behind
+    return ahead - n if ahead >= n else ahead, behind + n if behind < 0 else behind
+
+
+@jit()
+def _change(zero: Any, y: Any, row: Any, n: Any, half: Any, i: Any) -> Any:
+    ahead, behind = _ends(n, half, i)
     return load(zero, y, row + ahead) - load(zero, y, row + behind)
 
 
@@ -105,10 +109,8 @@ def stride_across(
     zero: Any, y: Any, row: Any, n: Any, half: Any, before: Any, i: Any, node: Any, context: Any
 ) -> Any:
     """Call ``node(zero, j, T_j, context)`` for j = i ... i + 7, given T_{i-1}; returns T_{i+7}."""
-    # Where neither end of the window passes the ring's end, rows follow each other: no wrapping.
-    ahead, behind = i + half, i - half - 1
-    ahead = ahead - n if ahead >= n else ahead
-    behind = behind + n if behind < 0 else behind
+    # Where neither end of the window passes the ring's end, rows follow each other.
+    ahead, behind = _ends(n, half, i)
     if max(ahead, behind) + 8 <= n:
         window = row + ahead, row + behind
         return _stride(zero, y, _change_inside, window, before, i, node, context)
@@ -173,5 +175,9 @@ def first_along(y: Any, row: Any, n: Any, half: Any) -> Any:
 @jit()
 def changes_along(y: Any, row: Any, n: Any, half: Any, i: Any) -> Any:
     """Give T_i - T_{i-1}, T_{i+1} - T_{i-1}, ... T_{i+7} - T_{i-1} of one trajectory."""
-    x = _load_ring(y, row, n, i + half) - _load_ring(y, row, n, i + n - half - 1)
+    ahead, behind = _ends(n, half, i)
+    if max(ahead, behind) + 8 <= n:
+        x = load_at(y, row + ahead) - load_at(y, row + behind)
+    else:
+        x = _load_ring(y, row, n, ahead) - _load_ring(y, row, n, behind)
     return add_shifted(add_shifted(add_shifted(x, 0), 1), 2)
