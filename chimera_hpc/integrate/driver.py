@@ -185,8 +185,8 @@ def choose_lanes(
     n_trajectories: int, n_rows: int, stages: int, n_observed: int, n_samples: int
 ) -> int:
     """One lane or a pack, from the number of trajectories and the memory that they take."""
-    fits = LANES * n_observed * n_samples * 8 <= SAMPLE_BYTES
-    fits = fits and LANES * (stages + 3) * n_rows * 8 <= PACK_BYTES
+    fits = LANES * _in_packs(n_observed) * n_samples * 8 <= SAMPLE_BYTES
+    fits = fits and LANES * (stages + 2) * n_rows * 8 <= PACK_BYTES
     return LANES if n_trajectories >= WORTH_A_PACK and fits else 1
 
 

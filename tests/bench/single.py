@@ -217,16 +217,19 @@ def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[floa
     return [times[name].median / taken[name] for name in runs]
 
 
+def _in_second_caches(n_nodes: int) -> float:
+    """Return the size of one ring's state and stages, in second caches."""
+    return (METHODS["tsit5"].stages + 2) * 2 * n_nodes * 8 / second_cache()
+
+
 def _by_cache(costs: Sequence[tuple[int, float]]) -> dict[str, list[tuple[int, float]]]:
     """Return the costs of rings by where their state is and how many go side by side."""
-    second = second_cache()
-    stages = METHODS["tsit5"].stages
     parts: dict[str, list[tuple[int, float]]] = {}
     for n, cost in costs:
-        lanes = choose_lanes(8, 2 * n, stages, 1, 1)
+        lanes = choose_lanes(8, 2 * n, METHODS["tsit5"].stages, 1, 1)
         if lanes > 1:
             where = f"{lanes} trajectories side by side"
-        elif (stages + 3) * 2 * n * 8 <= second:
+        elif _in_second_caches(n) <= 1.0:
             where = "one after the other, in the second cache"
         else:
             where = "one after the other, beyond the second cache"
@@ -257,6 +260,9 @@ def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
         costs_there = [cost for _, cost in part]
         what = "cost of a node and step, dearest ring over cheapest, "
         what += f"{part[0][0]} to {part[-1][0]} nodes"
+        if where.endswith("beyond the second cache"):
+            size = [_in_second_caches(n) for n, _ in (part[0], part[-1])]
+            where += f", {size[0]:.1f} to {size[1]:.1f} times as large as that"
         rows.append(Row(what, max(costs_there) / min(costs_there), "", 1.15, False, where))
     what = f"the same over all {len(scaling.nodes)} rings, steps from cache to cache included"
     each = [cost for _, cost in scaling.nodes]
