@@ -8,7 +8,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from chimera_hpc.integrate import kernel as K
+from chimera_hpc.integrate import lane_rows as K
 from chimera_hpc.integrate.driver import Control, Lanes, Outcome, integrate
 from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
 from chimera_hpc.integrate.simd import LANES

@@ -10,8 +10,18 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.integrate import METHODS
-from chimera_hpc.integrate import kernel as K
+from chimera_hpc.integrate import METHODS, kernel
+from chimera_hpc.integrate.lane_rows import (
+    ACCEPTED,
+    COUNT_ROWS,
+    FRESH,
+    IDLE,
+    LANE_ROWS,
+    LOG_ERROR,
+    NEXT_SAMPLE,
+    RUNNING,
+    STATE,
+)
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.status import Status
 
@@ -115,15 +125,15 @@ class Lanes:
         self.n_observed = n_observed
         self.control, self.method = control, method
         self.rhs, self.ints = system.right_hand_side, system.int_params
-        self.advance = K.advance(lanes)
+        self.advance = kernel.advance(lanes)
         self.params = aligned(len(system.lane_params), lanes)
         self.params[:] = system.lane_params[:, None]
         self.y, self.y1 = aligned(rows, lanes), aligned(rows, lanes)
         self.k = aligned(method.stages * rows, lanes)
         self.weights = aligned(method.stages, LANES)
-        self.lane = aligned(K.LANE_ROWS, lanes)
-        self.count = np.zeros((K.COUNT_ROWS, lanes), dtype=np.int64)
-        self.count[K.STATE] = K.IDLE
+        self.lane = aligned(LANE_ROWS, lanes)
+        self.count = np.zeros((COUNT_ROWS, lanes), dtype=np.int64)
+        self.count[STATE] = IDLE
         self.samples = aligned(lanes, control.n_samples, width, fill=np.empty)
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
@@ -132,12 +142,12 @@ class Lanes:
         self.y[: self.size, m] = y0
         self.params[:, m] = params
         self.lane[:, m] = 0.0
-        self.lane[K.LOG_ERROR, m] = K.LOG_ERROR_FLOOR
+        self.lane[LOG_ERROR, m] = kernel.LOG_ERROR_FLOOR
         self.count[:, m] = 0
-        self.count[K.STATE, m] = K.FRESH
+        self.count[STATE, m] = FRESH
         if self.control.start <= 0.0:
             self.sampled(m)[:, 0] = y0[: self.n_observed]
-            self.count[K.NEXT_SAMPLE, m] = 1
+            self.count[NEXT_SAMPLE, m] = 1
 
     def sampled(self, m: int) -> Array:
         """Samples of lane ``m``, shape (n_observed, n_samples)."""
@@ -148,7 +158,7 @@ class Lanes:
         """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""
         self.y[:, m] = self.y1[:, m] = self.k[:, m] = 0.0
         self.lane[:, m] = 0.0
-        self.count[K.STATE, m] = K.IDLE
+        self.count[STATE, m] = IDLE
 
     def run(self) -> float:
         """Call the compiled loop once; returns the wall time it took, seconds."""
@@ -253,19 +263,19 @@ def integrate(
         spent[busy] += pool.run() / len(busy)
         now = time.perf_counter()
         for m in busy:
-            number, state = holds[m], int(pool.count[K.STATE, m])
-            if state == K.RUNNING and now - since[m] > control.time_out:
+            number, state = holds[m], int(pool.count[STATE, m])
+            if state == RUNNING and now - since[m] > control.time_out:
                 state = int(Status.TIME_OUT)
-            if state == K.RUNNING or number is None:
+            if state == RUNNING or number is None:
                 continue
             on_end(
                 number,
                 Outcome(
                     Status(state),
-                    int(pool.count[K.ACCEPTED, m]),
+                    int(pool.count[ACCEPTED, m]),
                     float(spent[m]),
                     pool.sampled(m),
-                    int(pool.count[K.NEXT_SAMPLE, m]),
+                    int(pool.count[NEXT_SAMPLE, m]),
                     pool.y[: pool.size, m].copy(),
                 ),
             )

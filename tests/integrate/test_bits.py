@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernel_tools import run_all
 
-from chimera_hpc.integrate import kernel as K
+from chimera_hpc.integrate import lane_rows as K
 from chimera_hpc.integrate.driver import Control, Lanes
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.networked_fhn import NetworkedFHN

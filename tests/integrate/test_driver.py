@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernel_tools import System, powers, run_all
 
-from chimera_hpc.integrate import kernel as K
+from chimera_hpc.integrate import kernel
+from chimera_hpc.integrate import lane_rows as K
 from chimera_hpc.integrate.driver import (
     PACK_BYTES,
     SAMPLE_BYTES,
@@ -156,7 +157,7 @@ def test_cleared_lane_forgets_everything():
 
 def test_no_other_number_of_lanes_is_compiled():
     with pytest.raises(ValueError, match="1 and 8 lanes, not 4"):
-        K.advance(4)
+        kernel.advance(4)
 
 
 @given(st.integers(1, 40), st.integers(1, 40))

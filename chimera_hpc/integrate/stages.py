@@ -1,0 +1,153 @@
+"""Weighted sums over the stages of a step: the state of the next stage, the error of the step.
+
+Arrays and notation as in `kernel`. ``units`` counts what is worked on at once: a row of eight
+lanes, or eight rows of one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from chimera_hpc.integrate._jit import jit
+from chimera_hpc.integrate.lane_rows import ERROR_SUM
+from chimera_hpc.integrate.simd import fold, larger, load, magnitude, store
+
+
+@jit()
+def stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, out: Any) -> None:
+    """Write ``out = y + h * sum_{j < s} a[s, j] k_j``."""
+    # Spelled out up to six terms so that the compiler keeps the weights in registers. The rows go
+    # downwards, those of a right-hand side upwards: each finds in the cache what the other has
+    # left there.
+    o0 = first
+    if s == 1:
+        a0 = a[s, 0]
+        for i in range(units - 1, -1, -1):
+            store(out, i, load(h, y, i) + h * (a0 * load(h, k, o0 + i)))
+        return
+    o1 = units
+    if s == 2:
+        a0, a1 = a[s, 0], a[s, 1]
+        for i in range(units - 1, -1, -1):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            store(out, i, load(h, y, i) + h * total)
+        return
+    o2 = 2 * units
+    if s == 3:
+        a0, a1, a2 = a[s, 0], a[s, 1], a[s, 2]
+        for i in range(units - 1, -1, -1):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i)
+            store(out, i, load(h, y, i) + h * total)
+        return
+    o3 = 3 * units
+    if s == 4:
+        a0, a1, a2, a3 = a[s, 0], a[s, 1], a[s, 2], a[s, 3]
+        for i in range(units - 1, -1, -1):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
+            store(out, i, load(h, y, i) + h * total)
+        return
+    o4 = 4 * units
+    if s == 5:
+        a0, a1, a2, a3, a4 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4]
+        for i in range(units - 1, -1, -1):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
+            total = total + a4 * load(h, k, o4 + i)
+            store(out, i, load(h, y, i) + h * total)
+        return
+    o5 = 5 * units
+    if s == 6:
+        a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
+        for i in range(units - 1, -1, -1):
+            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
+            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
+            total = total + a4 * load(h, k, o4 + i) + a5 * load(h, k, o5 + i)
+            store(out, i, load(h, y, i) + h * total)
+        return
+    for i in range(units - 1, -1, -1):
+        total = a[s, 0] * load(h, k, o0 + i)
+        for j in range(1, s):
+            total = total + a[s, j] * load(h, k, j * units + i)
+        store(out, i, load(h, y, i) + h * total)
+
+
+@jit()
+def _squared(total: Any, i: Any, context: Any) -> Any:
+    h, y, y1, _, _, _, _, rtol, atol = context
+    size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
+    ratio = h * total / (atol + rtol * size)
+    return ratio * ratio
+
+
+@jit()
+def _error_of_seven(i: Any, context: Any) -> Any:
+    # Spelled out, as above.
+    h, _, _, k, first, units, (e0, e1, e2, e3, e4, e5, e6), _, _ = context
+    total = e0 * load(h, k, first + i) + e1 * load(h, k, units + i)
+    total = total + e2 * load(h, k, 2 * units + i)
+    total = total + e3 * load(h, k, 3 * units + i)
+    total = total + e4 * load(h, k, 4 * units + i)
+    total = total + e5 * load(h, k, 5 * units + i)
+    total = total + e6 * load(h, k, 6 * units - first + i)
+    return _squared(total, i, context)
+
+
+@jit()
+def _error_of_many(i: Any, context: Any) -> Any:
+    h, _, _, k, first, units, e, _, _ = context
+    last = e.size - 1
+    total = e[0] * load(h, k, first + i)
+    for j in range(1, last):
+        total = total + e[j] * load(h, k, j * units + i)
+    total = total + e[last] * load(h, k, last * units - first + i)
+    return _squared(total, i, context)
+
+
+@jit(inline="always")
+def _add_up(zero: Any, term: Any, context: Any, units: Any, lane: Any) -> None:
+    # Rows go to eight sums in turn, which are then folded in halves. One lane has its eight sums
+    # side by side in a pack.
+    if lane.shape[1] == 1:
+        total = term(0, context)
+        for i in range(1, units):
+            total = total + term(i, context)
+        lane[ERROR_SUM, 0] = fold(total)
+        return
+    s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
+    whole = units - units % 8
+    for i in range(0, whole, 8):
+        s0 = s0 + term(i, context)
+        s1 = s1 + term(i + 1, context)
+        s2 = s2 + term(i + 2, context)
+        s3 = s3 + term(i + 3, context)
+        s4 = s4 + term(i + 4, context)
+        s5 = s5 + term(i + 5, context)
+        s6 = s6 + term(i + 6, context)
+        s7 = s7 + term(i + 7, context)
+    left = units - whole
+    s0 = s0 + term(whole, context) if left > 0 else s0
+    s1 = s1 + term(whole + 1, context) if left > 1 else s1
+    s2 = s2 + term(whole + 2, context) if left > 2 else s2
+    s3 = s3 + term(whole + 3, context) if left > 3 else s3
+    s4 = s4 + term(whole + 4, context) if left > 4 else s4
+    s5 = s5 + term(whole + 5, context) if left > 5 else s5
+    s6 = s6 + term(whole + 6, context) if left > 6 else s6
+    store(lane, ERROR_SUM, ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))
+
+
+@jit()
+def error_sum(
+    zero: Any, h: Any, y: Any, y1: Any, k: Any, first: Any, units: Any, e: Any, rtol: Any,
+    atol: Any, lane: Any,
+) -> None:  # fmt: skip
+    """Sum ``(err_i / (atol + rtol max(|y_i|, |y1_i|)))**2``, HNW eq. II.4.11, over the rows.
+
+    The sum goes to the row `ERROR_SUM` of ``lane``.
+    """
+    if e.size == 7:
+        e7 = (e[0], e[1], e[2], e[3], e[4], e[5], e[6])
+        _add_up(zero, _error_of_seven, (h, y, y1, k, first, units, e7, rtol, atol), units, lane)
+    else:
+        _add_up(zero, _error_of_many, (h, y, y1, k, first, units, e, rtol, atol), units, lane)
