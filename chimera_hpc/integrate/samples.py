@@ -41,10 +41,9 @@ def _weight(p: Any, j: Any, theta: Any) -> Any:
 
 
 @jit()
-def _between(
-    h: Any, y: Any, k: Any, first: Any, units: Any, stages: Any, weights: Any, i: Any
-) -> Any:
+def _between(h: Any, y: Any, k: Any, first: Any, units: Any, weights: Any, i: Any) -> Any:
     # Row i of the state at time t + theta h of the step just made, by the continuous extension.
+    stages = weights.shape[0]
     total = load(h, weights, 0) * load(h, k, first + i)
     for j in range(1, stages - 1):
         total = total + load(h, weights, j) * load(h, k, j * units + i)
@@ -54,10 +53,9 @@ def _between(
 
 
 @jit()
-def _tile_between(
-    h: Any, y: Any, k: Any, first: Any, units: Any, stages: Any, weights: Any, i: Any
-) -> Any:
+def _tile_between(h: Any, y: Any, k: Any, first: Any, units: Any, weights: Any, i: Any) -> Any:
     # Rows i ... i + 7 of what `_between` gives, the weights read once for all of them.
+    stages = weights.shape[0]
     w = load(h, weights, 0)
     o = first + i
     t0, t1 = w * load(h, k, o), w * load(h, k, o + 1)
@@ -118,20 +116,19 @@ def sample(
     """
     lanes = y.shape[1]
     total, width = samples.shape[1:]
-    stages = p.shape[0]
     while _due(lane, count, total, start, step, t_end) > 0:
         theta = across(like, lane, THETA)
-        for j in range(stages):
+        for j in range(weights.shape[0]):
             store(weights, j, _weight(p, j, theta))
         if lanes == 1:
             base = count[NEXT_SAMPLE, 0] * width
             for i in range(width // LANES):
-                value = _between(h, y, k, first, units, stages, weights, i)
+                value = _between(h, y, k, first, units, weights, i)
                 stream_at(samples, base + i * LANES, value)
         else:
             for i in range(0, width, LANES):
                 s0, s1, s2, s3, s4, s5, s6, s7 = transposed(
-                    *_tile_between(h, y, k, first, units, stages, weights, i)
+                    *_tile_between(h, y, k, first, units, weights, i)
                 )
                 _keep(samples, count, 0, i, s0)
                 _keep(samples, count, 1, i, s1)
