@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -22,6 +23,7 @@ from chimera_hpc.integrate.lane_rows import (
     RUNNING,
     STATE,
 )
+from chimera_hpc.integrate.memory import aligned, lent
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.status import Status
 
@@ -88,7 +90,8 @@ class Outcome:
     """One trajectory's end: status, work done, sampled rows and last state.
 
     ``samples`` (n_observed, n_samples) is a view, time by time in memory, of a buffer that is used
-    again: take what is needed before returning; ``n_sampled`` of its columns were reached.
+    again, by later calls of `integrate` too: take what is needed before returning; ``n_sampled`` of
+    its columns were reached.
     ``status`` is DONE or one of the integrator's failures.
     """
 
@@ -104,18 +107,20 @@ class Stopped(Exception):
     """The caller asked to stop before every trajectory had ended."""
 
 
-def aligned(*shape: int, fill: Callable[[int], Array] = np.zeros) -> Array:
-    """Zeros, or what `fill` gives, from the start of a cache line: no vector load straddles two."""
-    size = int(np.prod(shape))
-    raw = fill(size + 8)
-    offset = (-raw.ctypes.data // 8) % 8
-    return raw[offset : offset + size].reshape(shape)
-
-
 class Lanes:
-    """The state of the stepping loop's lanes (arrays as in `kernel`)."""
+    """The state of the stepping loop's lanes (arrays as in `kernel`).
 
-    def __init__(self, lanes: int, system: System, control: Control, n_observed: int) -> None:
+    ``samples`` (lanes, n_samples, width) is room for samples in whole packs; new by default.
+    """
+
+    def __init__(
+        self,
+        lanes: int,
+        system: System,
+        control: Control,
+        n_observed: int,
+        samples: Array | None = None,
+    ) -> None:
         method = METHODS[control.method]
         # One lane has its rows in packs, up to the last one: rows of zeros fill that. Samples are
         # written in packs from any number of lanes.
@@ -134,7 +139,9 @@ class Lanes:
         self.lane = aligned(LANE_ROWS, lanes)
         self.count = np.zeros((COUNT_ROWS, lanes), dtype=np.int64)
         self.count[STATE] = IDLE
-        self.samples = aligned(lanes, control.n_samples, width, fill=np.empty)
+        if samples is None:
+            samples = aligned(lanes, control.n_samples, width, fill=np.empty)
+        self.samples = samples
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:
@@ -239,7 +246,23 @@ def integrate(
     initial = states if callable(states) else states.__getitem__
     rows, stages = systems[0].n_rows, METHODS[control.method].stages
     width = lanes or choose_lanes(len(systems), rows, stages, n_observed, control.n_samples)
-    pool = Lanes(width, systems[0], control, n_observed)
+    # Only the buffer of a pack, which is bounded, is kept; a trajectory alone may have any size,
+    # and `simulate` hands its samples on.
+    shape = width, control.n_samples, _in_packs(n_observed)
+    with nullcontext() if width == 1 else lent(*shape) as samples:
+        pool = Lanes(width, systems[0], control, n_observed, samples)
+        _work_through(pool, systems, initial, on_end, should_stop)
+
+
+def _work_through(
+    pool: Lanes,
+    systems: Sequence[System],
+    initial: Callable[[int], Array],
+    on_end: Callable[[int, Outcome], None],
+    should_stop: Callable[[], bool] | None,
+) -> None:
+    """Keep the lanes busy until every trajectory has ended."""
+    width = pool.y.shape[1]
     waiting = iter(range(len(systems)))
     holds: list[int | None] = [None] * width
     spent = np.zeros(width)
@@ -264,7 +287,7 @@ def integrate(
         now = time.perf_counter()
         for m in busy:
             number, state = holds[m], int(pool.count[STATE, m])
-            if state == RUNNING and now - since[m] > control.time_out:
+            if state == RUNNING and now - since[m] > pool.control.time_out:
                 state = int(Status.TIME_OUT)
             if state == RUNNING or number is None:
                 continue

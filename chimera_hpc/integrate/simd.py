@@ -149,6 +149,9 @@ if _config.DISABLE_JIT:
         """Write as `store_at` does, past the caches; the place must begin a cache line."""
         store_at(array, offset, pack)
 
+    def fetch(like: Any, array: Any, row: int) -> None:
+        """Ask for row ``row``, which need not exist, to be in the first cache when it is used."""
+
     def transposed(*packs: Any) -> Any:
         """Turn eight packs round: pack m of the result holds place m of each."""
         return tuple(np.stack(packs).T.copy())
@@ -228,6 +231,23 @@ else:
             return context.get_dummy_value()
 
         return types.void(array, offset, pack), generate
+
+    @intrinsic
+    def fetch(typing_context: Any, like: Any, array: Any, row: Any) -> Any:
+        """Ask for row ``row``, which need not exist, to be in the first cache when it is used."""
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            kind = "row" if isinstance(like, PackType) else "number"
+            pointer = _pointer(context, builder, signature, args, kind, first=1)
+            pointer = builder.bitcast(pointer, ir.IntType(8).as_pointer())
+            # To be read, kept in all caches, data: what a processor has of its own it may write.
+            options = map(ir.IntType(32), (0, 3, 1))
+            kind = ir.FunctionType(ir.VoidType(), [pointer.type, *3 * [ir.IntType(32)]])
+            insert: Any = cgutils.get_or_insert_function
+            builder.call(insert(builder.module, kind, "llvm.prefetch.p0"), [pointer, *options])
+            return context.get_dummy_value()
+
+        return types.void(like, array, row), generate
 
     @intrinsic
     def load_some(typing_context: Any, array: Any, offset: Any, low: Any, high: Any) -> Any:

@@ -15,6 +15,7 @@ from chimera_hpc.integrate._jit import jit
 from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
 from chimera_hpc.integrate.simd import (
     LANES,
+    fetch,
     last_of,
     load,
     load_at,
@@ -25,6 +26,7 @@ from chimera_hpc.integrate.simd import (
     store_some,
 )
 from chimera_hpc.models.sliding import (
+    AHEAD,
     changes_along,
     first_across,
     first_along,
@@ -58,6 +60,8 @@ def _keep(zero: Any, i: Any, total_y: Any, context: Any) -> None:
 @jit()
 def _node(zero: Any, i: Any, total_x: Any, context: Any) -> None:
     state, slopes, n, width, numbers = context
+    fetch(zero, slopes, i + AHEAD)
+    fetch(zero, slopes, n + i + AHEAD)
     x, y = load(zero, state, i), load(zero, state, n + i)
     pull_x, pull_y = total_x - width * x, load(zero, slopes, n + i) - width * y
     store(slopes, i, _activator(x, y, pull_x, pull_y, numbers))

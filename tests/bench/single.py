@@ -25,10 +25,8 @@ from chimera_hpc.models.topological_fhn import TopologicalFHN
 Array = NDArray[np.float64]
 
 RTOL = 1e-6
-LOOSER = tuple(
-    digits * 10.0**power for power in (-6, -5, -4) for digits in (1, 1.5, 2, 3, 4, 5, 6, 8)
-)
-"""Tolerances that are tried for an error that is not larger than a peer's."""
+LOOSER = tuple(float(f"{RTOL * 10.0 ** (k / 40):.3g}") for k in range(121))
+"""Tolerances that are tried for an error that is not larger than a peer's, 6 % apart."""
 HORIZON = 20.0
 """Errors are looked at up to here: later, chaos has made everything of them."""
 SEEDS = 16

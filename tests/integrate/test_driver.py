@@ -7,8 +7,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from kernel_tools import System, powers, run_all
 
 from chimera_hpc.integrate import kernel
@@ -20,7 +18,6 @@ from chimera_hpc.integrate.driver import (
     Control,
     Lanes,
     Stopped,
-    aligned,
     choose_lanes,
     integrate,
 )
@@ -158,15 +155,6 @@ def test_cleared_lane_forgets_everything():
 def test_no_other_number_of_lanes_is_compiled():
     with pytest.raises(ValueError, match="1 and 8 lanes, not 4"):
         kernel.advance(4)
-
-
-@given(st.integers(1, 40), st.integers(1, 40))
-def test_state_begins_on_a_cache_line(rows, lanes):
-    array = aligned(rows, lanes)
-    assert array.shape == (rows, lanes)
-    assert array.ctypes.data % 64 == 0
-    assert array.flags.c_contiguous
-    assert not array.any()
 
 
 def test_lanes_follow_the_work_and_the_memory():

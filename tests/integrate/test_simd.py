@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from kernel_tools import compiled
 
-from chimera_hpc.integrate.driver import aligned
+from chimera_hpc.integrate.memory import aligned
 from chimera_hpc.integrate.simd import (
     LANES,
     across,
     add_shifted,
+    fetch,
     fold,
     larger,
     last_of,
@@ -179,6 +180,18 @@ def test_eight_packs_turn_round():
     a, out = np.arange(64.0).reshape(8, 8), aligned(8, 8)
     turn(a, out)
     np.testing.assert_array_equal(out, a.T)
+
+
+@pytest.mark.parametrize("row", [-(10**6), -1, 0, 8, 10**6])
+def test_fetching_reads_and_writes_nothing(row):
+    @numba.njit
+    def ask(array, row):
+        fetch(splat(0.0), array, row)
+        fetch(0.0, array, row)
+
+    array = np.arange(64.0).reshape(8, 8)
+    ask(array, row)
+    assert array.tolist() == np.arange(64.0).reshape(8, 8).tolist()
 
 
 def test_what_is_not_loaded_is_not_touched():
