@@ -246,8 +246,8 @@ def integrate(
     initial = states if callable(states) else states.__getitem__
     rows, stages = systems[0].n_rows, METHODS[control.method].stages
     width = lanes or choose_lanes(len(systems), rows, stages, n_observed, control.n_samples)
-    # Only the buffer of a pack, which is bounded, is kept; a trajectory alone may have any size,
-    # and `simulate` hands its samples on.
+    # Kept is what a pack needs, for which `choose_lanes` sets a bound; the samples of a trajectory
+    # alone may have any size, and `simulate` hands them on.
     shape = width, control.n_samples, _in_packs(n_observed)
     with nullcontext() if width == 1 else lent(*shape) as samples:
         pool = Lanes(width, systems[0], control, n_observed, samples)

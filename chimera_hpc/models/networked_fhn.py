@@ -26,7 +26,6 @@ from chimera_hpc.integrate.simd import (
     store_some,
 )
 from chimera_hpc.models.sliding import (
-    AHEAD,
     changes_along,
     first_across,
     first_along,
@@ -37,6 +36,9 @@ from chimera_hpc.models.sliding import (
 Array = NDArray[np.float64]
 
 THIRD = 1.0 / 3.0
+AHEAD = 16
+"""Nodes between the one worked on and the one whose slopes are fetched into the first cache: the
+processor foresees by itself what will be read, but not what will be written only."""
 
 
 @jit()

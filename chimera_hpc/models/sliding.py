@@ -20,10 +20,6 @@ from chimera_hpc.integrate.simd import (
     splat,
 )
 
-AHEAD = 16
-"""Nodes between the one worked on and the one whose slopes are fetched into the first cache: what
-is only written is not foreseen by the processor as what is read is."""
-
 
 @jit()
 def _ends(n: Any, half: Any, i: Any) -> Any:
