@@ -31,8 +31,8 @@ _kept = _Kept()
 def lent(*shape: int) -> Iterator[Array]:
     """Lend an array that holds anything; this thread gets the same memory again the next time.
 
-    New memory comes from the system page by page, which for samples takes longer than to compute
-    what is written there. Whoever asks while it is lent gets some of his own.
+    New memory comes from the system page by page, whenever a page is first written to, and that
+    takes time. Whoever asks while the room is lent gets some of his own.
     """
     size = int(np.prod(shape))
     room, _kept.room = _kept.room, None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from threading import Thread
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from kernel_tools import System, powers, run_all
@@ -56,15 +57,10 @@ def test_room_that_is_lent_is_lent_to_nobody_else():
 
 
 def test_room_comes_back_from_work_that_failed():
-    for _ in range(2):
-        try:
-            with lent(100) as room:
-                address = room.ctypes.data
-                raise ValueError
-        except ValueError:
-            continue
-    with lent(100) as room:
-        assert room.ctypes.data == address
+    with pytest.raises(ValueError, match="its work failed"), lent(100) as room:
+        raise ValueError("its work failed")
+    with lent(100) as again:
+        assert again.ctypes.data == room.ctypes.data
 
 
 def test_samples_do_not_depend_on_who_used_the_room_before():
