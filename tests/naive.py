@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import partial
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -340,11 +341,11 @@ def runge_kutta(f, y, method, t_end, times, rtol, atol, max_steps=10**6):
     while t < t_end and tried < max_steps:
         k = k[:1]
         for row in range(1, method.stages):
-            y1 = y + h * running_sum([method.a[row, j] * k[j] for j in range(row)])
+            y1 = fma(h, weighted_sum(method.a[row, :row], k), y)
             k.append(f(y1))
-        error = h * running_sum([e * stage for e, stage in zip(method.e, k, strict=True)])
+        error = h * weighted_sum(method.e, k)
         size = np.where(np.abs(y) > np.abs(y1), np.abs(y), np.abs(y1))
-        log_error = log_norm(error / (atol + rtol * size))
+        log_error = log_norm(error / fma(rtol, size, atol))
         tried += 1
         if log_error > 0.0:
             h, rejected = h * max(0.2, 0.9 * math.exp(-log_error / method.order)), True
@@ -354,9 +355,8 @@ def runge_kutta(f, y, method, t_end, times, rtol, atol, max_steps=10**6):
                 theta = min((times[len(samples)] - t) / h, 1.0)
                 weights = np.zeros(method.stages)
                 for column in method.p.T[::-1]:
-                    weights = (weights + column) * theta
-                terms = [weight * stage for weight, stage in zip(weights, k, strict=True)]
-                samples.append(y + h * running_sum(terms))
+                    weights = fma(weights, theta, column)
+                samples.append(fma(h, weighted_sum(weights * theta, k), y))
             bounded = max(log_error, math.log(1e-4))
             factor = 0.9 * math.exp((0.4 * log_before - 0.7 * bounded) / method.order)
             factor = min(10.0, max(0.2, factor))
@@ -369,11 +369,26 @@ def runge_kutta(f, y, method, t_end, times, rtol, atol, max_steps=10**6):
     return np.array(samples), y, accepted, tried, t
 
 
+@partial(np.vectorize, otypes=[float])
+def fma(a, b, c):
+    """Multiply and add, rounded once: through whole numbers, whose quotient Python rounds right."""
+    (n1, d1), (n2, d2), (n3, d3) = (float(x).as_integer_ratio() for x in (a, b, c))
+    return (n1 * n2 * d3 + n3 * d1 * d2) / (d1 * d2 * d3)
+
+
+def weighted_sum(weights, stages):
+    """Sum of the stages, each but the first multiplied and added in one rounding."""
+    total = weights[0] * stages[0]
+    for weight, stage in zip(weights[1:], stages[1:], strict=True):
+        total = fma(weight, stage, total)
+    return total
+
+
 def log_norm(scaled):
     """Logarithm of the root mean square, the squares added in eight sums in turn."""
     sums = [0.0] * 8
-    for i, square in enumerate((scaled * scaled).tolist()):
-        sums[i % 8] += square
+    for i, ratio in enumerate(scaled):
+        sums[i % 8] = fma(ratio, ratio, sums[i % 8])
     halves = [sums[i] + sums[i + 4] for i in range(4)]
     total = (halves[0] + halves[2]) + (halves[1] + halves[3])
     return 0.5 * math.log(total / len(scaled)) if total > 0.0 else math.log(1e-4)

@@ -135,7 +135,7 @@ class Lanes:
         self.params[:] = system.lane_params[:, None]
         self.y, self.y1 = aligned(rows, lanes), aligned(rows, lanes)
         self.k = aligned(method.stages * rows, lanes)
-        self.weights = aligned(method.stages, LANES)
+        self.weights = aligned(2 * method.stages, LANES)
         self.lane = aligned(LANE_ROWS, lanes)
         self.count = np.zeros((COUNT_ROWS, lanes), dtype=np.int64)
         self.count[STATE] = IDLE

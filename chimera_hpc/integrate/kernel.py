@@ -87,9 +87,10 @@ def _start(
                 h = 0.01 * d0 / d1
             lane[STEP, m] = min(h, t_end)
     for m in range(lanes):
-        h = lane[STEP, m] if count[STATE, m] == FRESH else 0.0
-        for i in range(size):
-            y1[i, m] = y[i, m] + h * k[s1 + i, m]
+        if count[STATE, m] == FRESH:
+            h = lane[STEP, m]
+            for i in range(size):
+                y1[i, m] = y[i, m] + h * k[s1 + i, m]
     rhs(y1[:size], k[s2 : s2 + size], params, ints)
     for m in range(lanes):
         if count[STATE, m] == FRESH:
@@ -266,7 +267,7 @@ def advance(lanes: int) -> Any:
     most ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
     returns how many it tried. Lanes marked `FRESH` are started first: first derivative, first step
     size. ``samples`` (lanes, samples, width) begins on a cache line and ``width`` is a multiple of
-    `LANES`; ``weights`` (stages, `LANES`) is room for what a sample is made with.
+    `LANES`; ``weights`` (2 stages, `LANES`) is room for what two samples are made with.
     """
     if lanes not in (1, LANES):
         raise ValueError(f"the stepping loop is compiled for 1 and {LANES} lanes, not {lanes}")

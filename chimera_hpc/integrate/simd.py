@@ -15,6 +15,7 @@ With ``NUMBA_DISABLE_JIT=1`` a pack is a NumPy array of `LANES` numbers.
 
 from __future__ import annotations
 
+import ctypes
 import operator
 from typing import Any
 
@@ -155,6 +156,15 @@ if _config.DISABLE_JIT:
     def transposed(*packs: Any) -> Any:
         """Turn eight packs round: pack m of the result holds place m of each."""
         return tuple(np.stack(packs).T.copy())
+
+    _fused = ctypes.CDLL(None).fma  # of the C library
+    _fused.restype, _fused.argtypes = ctypes.c_double, 3 * [ctypes.c_double]
+
+    def fma(a: Any, b: Any, c: Any) -> Any:
+        """Give ``a * b + c``, lane by lane, rounded once: IEEE 754's fusedMultiplyAdd."""
+        columns = np.broadcast_arrays(a, b, c)
+        each = [_fused(*numbers) for numbers in np.stack(columns).reshape(3, -1).T]
+        return np.array(each) if len(each) > 1 else np.float64(each[0])
 
     def larger(a: Any, b: Any) -> Any:
         """Larger of two numbers, lane by lane; ``b`` where either is NaN."""
@@ -361,6 +371,21 @@ else:
             return context.get_dummy_value()
 
         return types.void(array, row, value), generate
+
+    @intrinsic
+    def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+        """Give ``a * b + c``, lane by lane, rounded once: IEEE 754's fusedMultiplyAdd."""
+        result = pack_type if pack_type in (a, b, c) else types.float64
+
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            if result is pack_type:
+                args = [n if n.type == _VECTOR else _spread(builder, n) for n in args]
+            kind = ir.FunctionType(args[0].type, [args[0].type] * 3)
+            name = f"llvm.fma.{f'v{LANES}f64' if result is pack_type else 'f64'}"
+            insert: Any = cgutils.get_or_insert_function
+            return builder.call(insert(builder.module, kind, name), args)
+
+        return result(*(n if n == pack_type else types.float64 for n in (a, b, c))), generate
 
     @intrinsic
     def larger(typing_context: Any, a: Any, b: Any) -> Any:

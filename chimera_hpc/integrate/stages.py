@@ -10,7 +10,7 @@ from typing import Any
 
 from chimera_hpc.integrate._jit import jit
 from chimera_hpc.integrate.lane_rows import ERROR_SUM
-from chimera_hpc.integrate.simd import fold, larger, load, magnitude, store
+from chimera_hpc.integrate.simd import fma, fold, larger, load, magnitude, splat, store
 
 
 @jit()
@@ -23,75 +23,84 @@ def stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, ou
     if s == 1:
         a0 = a[s, 0]
         for i in range(units - 1, -1, -1):
-            store(out, i, load(h, y, i) + h * (a0 * load(h, k, o0 + i)))
+            store(out, i, fma(h, a0 * load(h, k, o0 + i), load(h, y, i)))
         return
     o1 = units
     if s == 2:
         a0, a1 = a[s, 0], a[s, 1]
         for i in range(units - 1, -1, -1):
-            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
-            store(out, i, load(h, y, i) + h * total)
+            total = a0 * load(h, k, o0 + i)
+            total = fma(a1, load(h, k, o1 + i), total)
+            store(out, i, fma(h, total, load(h, y, i)))
         return
     o2 = 2 * units
     if s == 3:
         a0, a1, a2 = a[s, 0], a[s, 1], a[s, 2]
         for i in range(units - 1, -1, -1):
-            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
-            total = total + a2 * load(h, k, o2 + i)
-            store(out, i, load(h, y, i) + h * total)
+            total = a0 * load(h, k, o0 + i)
+            total = fma(a1, load(h, k, o1 + i), total)
+            total = fma(a2, load(h, k, o2 + i), total)
+            store(out, i, fma(h, total, load(h, y, i)))
         return
     o3 = 3 * units
     if s == 4:
         a0, a1, a2, a3 = a[s, 0], a[s, 1], a[s, 2], a[s, 3]
         for i in range(units - 1, -1, -1):
-            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
-            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
-            store(out, i, load(h, y, i) + h * total)
+            total = a0 * load(h, k, o0 + i)
+            total = fma(a1, load(h, k, o1 + i), total)
+            total = fma(a2, load(h, k, o2 + i), total)
+            total = fma(a3, load(h, k, o3 + i), total)
+            store(out, i, fma(h, total, load(h, y, i)))
         return
     o4 = 4 * units
     if s == 5:
         a0, a1, a2, a3, a4 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4]
         for i in range(units - 1, -1, -1):
-            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
-            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
-            total = total + a4 * load(h, k, o4 + i)
-            store(out, i, load(h, y, i) + h * total)
+            total = a0 * load(h, k, o0 + i)
+            total = fma(a1, load(h, k, o1 + i), total)
+            total = fma(a2, load(h, k, o2 + i), total)
+            total = fma(a3, load(h, k, o3 + i), total)
+            total = fma(a4, load(h, k, o4 + i), total)
+            store(out, i, fma(h, total, load(h, y, i)))
         return
     o5 = 5 * units
     if s == 6:
         a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
         for i in range(units - 1, -1, -1):
-            total = a0 * load(h, k, o0 + i) + a1 * load(h, k, o1 + i)
-            total = total + a2 * load(h, k, o2 + i) + a3 * load(h, k, o3 + i)
-            total = total + a4 * load(h, k, o4 + i) + a5 * load(h, k, o5 + i)
-            store(out, i, load(h, y, i) + h * total)
+            total = a0 * load(h, k, o0 + i)
+            total = fma(a1, load(h, k, o1 + i), total)
+            total = fma(a2, load(h, k, o2 + i), total)
+            total = fma(a3, load(h, k, o3 + i), total)
+            total = fma(a4, load(h, k, o4 + i), total)
+            total = fma(a5, load(h, k, o5 + i), total)
+            store(out, i, fma(h, total, load(h, y, i)))
         return
     for i in range(units - 1, -1, -1):
         total = a[s, 0] * load(h, k, o0 + i)
         for j in range(1, s):
-            total = total + a[s, j] * load(h, k, j * units + i)
-        store(out, i, load(h, y, i) + h * total)
+            total = fma(a[s, j], load(h, k, j * units + i), total)
+        store(out, i, fma(h, total, load(h, y, i)))
 
 
 @jit()
-def _squared(total: Any, i: Any, context: Any) -> Any:
+def _scaled(total: Any, i: Any, context: Any) -> Any:
     h, y, y1, _, _, _, _, rtol, atol = context
     size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
-    ratio = h * total / (atol + rtol * size)
-    return ratio * ratio
+    return h * total / fma(rtol, size, atol)
 
 
 @jit()
 def _error_of_seven(i: Any, context: Any) -> Any:
     # Spelled out, as above.
     h, _, _, k, first, units, (e0, e1, e2, e3, e4, e5, e6), _, _ = context
-    total = e0 * load(h, k, first + i) + e1 * load(h, k, units + i)
-    total = total + e2 * load(h, k, 2 * units + i)
-    total = total + e3 * load(h, k, 3 * units + i)
-    total = total + e4 * load(h, k, 4 * units + i)
-    total = total + e5 * load(h, k, 5 * units + i)
-    total = total + e6 * load(h, k, 6 * units - first + i)
-    return _squared(total, i, context)
+    total = e0 * load(h, k, first + i)
+    total = fma(e1, load(h, k, units + i), total)
+    total = fma(e2, load(h, k, 2 * units + i), total)
+    total = fma(e3, load(h, k, 3 * units + i), total)
+    total = fma(e4, load(h, k, 4 * units + i), total)
+    total = fma(e5, load(h, k, 5 * units + i), total)
+    total = fma(e6, load(h, k, 6 * units - first + i), total)
+    return _scaled(total, i, context)
 
 
 @jit()
@@ -100,9 +109,14 @@ def _error_of_many(i: Any, context: Any) -> Any:
     last = e.size - 1
     total = e[0] * load(h, k, first + i)
     for j in range(1, last):
-        total = total + e[j] * load(h, k, j * units + i)
-    total = total + e[last] * load(h, k, last * units - first + i)
-    return _squared(total, i, context)
+        total = fma(e[j], load(h, k, j * units + i), total)
+    total = fma(e[last], load(h, k, last * units - first + i), total)
+    return _scaled(total, i, context)
+
+
+@jit()
+def _add_square(total: Any, ratio: Any) -> Any:
+    return fma(ratio, ratio, total)
 
 
 @jit(inline="always")
@@ -110,30 +124,30 @@ def _add_up(zero: Any, term: Any, context: Any, units: Any, lane: Any) -> None:
     # Rows go to eight sums in turn, which are then folded in halves. One lane has its eight sums
     # side by side in a pack.
     if lane.shape[1] == 1:
-        total = term(0, context)
-        for i in range(1, units):
-            total = total + term(i, context)
+        total = splat(0.0)
+        for i in range(units):
+            total = _add_square(total, term(i, context))
         lane[ERROR_SUM, 0] = fold(total)
         return
     s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
     whole = units - units % 8
     for i in range(0, whole, 8):
-        s0 = s0 + term(i, context)
-        s1 = s1 + term(i + 1, context)
-        s2 = s2 + term(i + 2, context)
-        s3 = s3 + term(i + 3, context)
-        s4 = s4 + term(i + 4, context)
-        s5 = s5 + term(i + 5, context)
-        s6 = s6 + term(i + 6, context)
-        s7 = s7 + term(i + 7, context)
+        s0 = _add_square(s0, term(i, context))
+        s1 = _add_square(s1, term(i + 1, context))
+        s2 = _add_square(s2, term(i + 2, context))
+        s3 = _add_square(s3, term(i + 3, context))
+        s4 = _add_square(s4, term(i + 4, context))
+        s5 = _add_square(s5, term(i + 5, context))
+        s6 = _add_square(s6, term(i + 6, context))
+        s7 = _add_square(s7, term(i + 7, context))
     left = units - whole
-    s0 = s0 + term(whole, context) if left > 0 else s0
-    s1 = s1 + term(whole + 1, context) if left > 1 else s1
-    s2 = s2 + term(whole + 2, context) if left > 2 else s2
-    s3 = s3 + term(whole + 3, context) if left > 3 else s3
-    s4 = s4 + term(whole + 4, context) if left > 4 else s4
-    s5 = s5 + term(whole + 5, context) if left > 5 else s5
-    s6 = s6 + term(whole + 6, context) if left > 6 else s6
+    s0 = _add_square(s0, term(whole, context)) if left > 0 else s0
+    s1 = _add_square(s1, term(whole + 1, context)) if left > 1 else s1
+    s2 = _add_square(s2, term(whole + 2, context)) if left > 2 else s2
+    s3 = _add_square(s3, term(whole + 3, context)) if left > 3 else s3
+    s4 = _add_square(s4, term(whole + 4, context)) if left > 4 else s4
+    s5 = _add_square(s5, term(whole + 5, context)) if left > 5 else s5
+    s6 = _add_square(s6, term(whole + 6, context)) if left > 6 else s6
     store(lane, ERROR_SUM, ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))
 
 

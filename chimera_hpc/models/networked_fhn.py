@@ -16,6 +16,7 @@ from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
 from chimera_hpc.integrate.simd import (
     LANES,
     fetch,
+    fma,
     last_of,
     load,
     load_at,
@@ -43,14 +44,15 @@ processor foresees by itself what will be read, but not what will be written onl
 
 @jit()
 def _activator(x: Any, y: Any, pull_x: Any, pull_y: Any, numbers: Any) -> Any:
-    rate, _, gain, same, cross = numbers
-    return (x - x * x * x * THIRD - y + gain * (same * pull_x + cross * pull_y)) * rate
+    rate, _, same, cross = numbers
+    pull = fma(cross, pull_y, same * pull_x)
+    return fma(x, fma(x * x, -THIRD, 1.0), pull - y) * rate
 
 
 @jit()
 def _inhibitor(x: Any, pull_x: Any, pull_y: Any, numbers: Any) -> Any:
-    _, b, gain, same, cross = numbers
-    return x + b + gain * (same * pull_y - cross * pull_x)
+    _, b, same, cross = numbers
+    return fma(same, pull_y, fma(-1.0 * cross, pull_x, x + b))
 
 
 @jit()
@@ -65,7 +67,8 @@ def _node(zero: Any, i: Any, total_x: Any, context: Any) -> None:
     fetch(zero, slopes, i + AHEAD)
     fetch(zero, slopes, n + i + AHEAD)
     x, y = load(zero, state, i), load(zero, state, n + i)
-    pull_x, pull_y = total_x - width * x, load(zero, slopes, n + i) - width * y
+    pull_x = fma(-width, x, total_x)
+    pull_y = fma(-width, y, load(zero, slopes, n + i))
     store(slopes, i, _activator(x, y, pull_x, pull_y, numbers))
     store(slopes, n + i, _inhibitor(x, pull_x, pull_y, numbers))
 
@@ -79,7 +82,6 @@ def _across(zero: Any, state: Any, slopes: Any, params: Any, ints: Any) -> None:
         load(zero, params, 1),
         load(zero, params, 2),
         load(zero, params, 3),
-        load(zero, params, 4),
     )
     context = (state, slopes, n, 2.0 * half + 1.0, numbers)
     total_x = first_across(zero, state, 0, n, half)
@@ -95,7 +97,7 @@ def _across(zero: Any, state: Any, slopes: Any, params: Any, ints: Any) -> None:
 def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
     # One trajectory, eight nodes at a time.
     n, half = ints[0], ints[1]
-    numbers = (params[0, 0], params[1, 0], params[2, 0], params[3, 0], params[4, 0])
+    numbers = (params[0, 0], params[1, 0], params[2, 0], params[3, 0])
     width = 2.0 * half + 1.0
     before_x, before_y = first_along(state, 0, n, half), first_along(state, n, n, half)
     for i in range(0, n, LANES):
@@ -104,7 +106,8 @@ def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
         left = n - i
         x = load_at(state, i) if left >= LANES else load_some(state, i, 0, left)
         y = load_at(state, n + i) if left >= LANES else load_some(state, n + i, 0, left)
-        pull_x, pull_y = before_x + change_x - width * x, before_y + change_y - width * y
+        pull_x = fma(-width, x, before_x + change_x)
+        pull_y = fma(-width, y, before_y + change_y)
         slope_x = _activator(x, y, pull_x, pull_y, numbers)
         slope_y = _inhibitor(x, pull_x, pull_y, numbers)
         if left >= LANES:
@@ -117,7 +120,7 @@ def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
 
 
 def networked_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
-    """Right-hand side; ``lane_params`` rows: 1/epsilon, b, sigma/2P, cos phi, sin phi."""
+    """Right-hand side; ``lane_params`` rows: 1/epsilon, b, sigma/2P times cos and sin of phi."""
     if y.shape[1] == LANES:
         _across(splat(0.0), y, dy, lane_params, int_params)
     elif int_params[0] >= LANES:
@@ -196,9 +199,10 @@ class NetworkedFHN:
 
     @property
     def lane_params(self) -> Array:
-        """This trajectory's column of parameters, shape (5,)."""
+        """This trajectory's column of parameters, shape (4,)."""
         gain = self.sigma / (2 * self.half_degree)
-        return np.array([1.0 / self.epsilon, self.b, gain, math.cos(self.phi), math.sin(self.phi)])
+        same, cross = gain * math.cos(self.phi), gain * math.sin(self.phi)
+        return np.array([1.0 / self.epsilon, self.b, same, cross])
 
     def state(self, u: Array, v: Array) -> Array:
         """Integrated variables of a state given by x and y, both (N0,)."""

@@ -266,3 +266,11 @@ def test_packs_do_the_same_without_compilation():
     here = {}
     exec(RUN_PACK, here)
     assert python(RUN_PACK + "print(run())", NUMBA_DISABLE_JIT="1") == here["run"]() + "\n"
+
+
+def test_a_processor_without_fused_instructions_gives_the_same_bits(tmp_path):
+    # Compiled for the oldest processor of this kind: the C library multiplies and adds there.
+    here = {}
+    exec(RUN_PACK, here)
+    old = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
+    assert python(RUN_PACK + "print(run())", **old) == here["run"]() + "\n"

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import operator
 
+import naive
 import numba
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from kernel_tools import compiled
 
 from chimera_hpc.integrate.memory import aligned
@@ -15,6 +18,7 @@ from chimera_hpc.integrate.simd import (
     across,
     add_shifted,
     fetch,
+    fma,
     fold,
     larger,
     last_of,
@@ -114,6 +118,53 @@ def test_a_number_meets_every_lane_of_a_pack():
     mixed(x[None, :].copy(), out, np.zeros((1, LANES)), np.zeros(1, dtype=np.int64))
     expected = [2.0 + x, x + 2.0, 2.0 - x, x - 2.0, 2.0 * x, x * 2.0, 2.0 / x, x / 2.0]
     np.testing.assert_array_equal(out, expected)
+
+
+@compiled
+def fused(y, dy, lane_params, int_params):
+    # Packs and numbers in every place.
+    like, number = splat(0.0), lane_params[0, 0]
+    a, b, c = load(like, y, 0), load(like, y, 1), load(like, y, 2)
+    store(dy, 0, fma(a, b, c))
+    store(dy, 1, fma(number, b, c))
+    store(dy, 2, fma(a, number, c))
+    store(dy, 3, fma(a, b, number))
+    store(dy, 4, fma(number, number, c))
+    for lane in range(LANES):
+        dy[5, lane] = fma(y[0, lane], y[1, lane], y[2, lane])
+
+
+NUMBERS = st.floats(-1e100, 1e100).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
+
+
+@given(
+    st.lists(NUMBERS, min_size=2 * LANES, max_size=2 * LANES),
+    st.lists(st.floats(-(2.0**-52), 2.0**-52), min_size=LANES, max_size=LANES),
+    NUMBERS,
+)
+def test_fma_rounds_once(factors, rest, number):
+    a, b = np.array(factors).reshape(2, LANES)
+    # Near -a b, where two roundings leave nothing of the product's lower half.
+    c = -a * b * (1.0 + np.array(rest))
+    out = np.empty((6, LANES))
+    fused(np.stack([a, b, c]), out, np.full((1, LANES), number), np.zeros(1, dtype=np.int64))
+    np.testing.assert_array_equal(out[0], naive.fma(a, b, c))
+    np.testing.assert_array_equal(out[1], naive.fma(number, b, c))
+    np.testing.assert_array_equal(out[2], naive.fma(a, number, c))
+    np.testing.assert_array_equal(out[3], naive.fma(a, b, number))
+    np.testing.assert_array_equal(out[4], naive.fma(number, number, c))
+    np.testing.assert_array_equal(out[5], out[0])
+
+
+def test_fma_of_what_is_not_finite():
+    y = np.zeros((3, LANES))
+    y[:, :5] = np.array(
+        [[np.inf, 1, 2], [np.inf, 0, 1], [1, 2, -np.inf], [np.nan, 1, 1], [9, 9, 9]]
+    ).T
+    out = np.empty((6, LANES))
+    fused(y, out, np.zeros((1, LANES)), np.zeros(1, dtype=np.int64))
+    for row in (0, 5):
+        np.testing.assert_array_equal(out[row, :5], [np.inf, np.nan, -np.inf, np.nan, 90.0])
 
 
 def test_rows_are_read_and_written_where_they_are():
