@@ -144,12 +144,12 @@ start {load:.1f}."""
 _WHY = """\
 What limits it:
 
-* Eight trajectories of 50 nodes fill the first cache and a little more, of 500 nodes a part of the
-  second one, whose rate bounds the sums over stages; the error norm waits for its divisions. That,
-  and the work on two variables, is what limits the networked model. From about 850 nodes on one
-  trajectory at a time goes along the ring. From some 15,000 its state is larger than the second
-  cache: the part of it that still stays there shrinks as the ring grows, the rest comes from the
-  third cache or from memory.
+* Eight trajectories of 50 nodes fill the first cache and a little more; of 100 to 500 nodes they
+  fill a part of the second one, whose rate bounds the sums over stages. The error norm waits for
+  its divisions. That, and the work on two variables, is what limits the networked model. From about
+  850 nodes on one trajectory at a time goes along the ring. From some 15,000 its state is larger
+  than the second cache: the part of it that still stays there shrinks as the ring grows, the rest
+  comes from the third cache or from memory.
 * Starting Python, the cluster and its workers, planning and the reduction take some four seconds
   whatever the number of points, and at the end one worker waits for the other's last block.
 * A virtual machine may change its speed by half within seconds, and a median of five turns with
