@@ -262,6 +262,17 @@ def test_block_that_cannot_be_done_is_put_aside_and_told_of(
     assert "Traceback" in (tmp_path / "out" / "run.log").read_text()
 
 
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Signals as in a terminal: `nohup`, or a shell's background, has had some of them ignored."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in usual.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize(
     ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 75), (signal.SIGHUP, 75)]
 )
@@ -290,6 +301,7 @@ def test_signal_stops_in_good_order(
     assert sweep(*words)[0] == 0
 
 
+@pytest.mark.usefixtures("heard")
 def test_second_interrupt_breaks_off_at_once(
     job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
