@@ -64,6 +64,14 @@ def _eight(h: Any, rows: Any, i: Any) -> Any:
 
 
 @jit()
+def _eight_of(j: Any, h: Any, k: Any, first: Any, units: Any, stages: Any, i: Any) -> Any:
+    # Rows i ... i + 7 of stage j; the first stage and the last may have changed places.
+    if j == 0:
+        return _eight(h, k, first + i)
+    return _eight(h, k, j * units + i - (first if j == stages - 1 else 0))
+
+
+@jit()
 def _times(w: Any, a: Any) -> Any:
     return w * a[0], w * a[1], w * a[2], w * a[3], w * a[4], w * a[5], w * a[6], w * a[7]
 
@@ -80,9 +88,9 @@ def _fma_each(w: Any, a: Any, b: Any) -> Any:
 def _tile(h: Any, y: Any, k: Any, first: Any, units: Any, weights: Any, i: Any) -> Any:
     # Rows i ... i + 7 of what `_between` gives, the weights read once for all of them.
     stages = weights.shape[0] // 2
-    tile = _times(load(h, weights, 0), _eight(h, k, first + i))
+    tile = _times(load(h, weights, 0), _eight_of(0, h, k, first, units, stages, i))
     for j in range(1, stages):
-        rows = _eight(h, k, i + (j * units if j < stages - 1 else j * units - first))
+        rows = _eight_of(j, h, k, first, units, stages, i)
         tile = _fma_each(load(h, weights, j), rows, tile)
     return _fma_each(h, tile, _eight(h, y, i))
 
@@ -91,10 +99,10 @@ def _tile(h: Any, y: Any, k: Any, first: Any, units: Any, weights: Any, i: Any) 
 def _two_tiles(h: Any, y: Any, k: Any, first: Any, units: Any, weights: Any, i: Any) -> Any:
     # The same for two samples, the stages read once for both.
     stages = weights.shape[0] // 2
-    rows = _eight(h, k, first + i)
+    rows = _eight_of(0, h, k, first, units, stages, i)
     tile, after = _times(load(h, weights, 0), rows), _times(load(h, weights, stages), rows)
     for j in range(1, stages):
-        rows = _eight(h, k, i + (j * units if j < stages - 1 else j * units - first))
+        rows = _eight_of(j, h, k, first, units, stages, i)
         tile = _fma_each(load(h, weights, j), rows, tile)
         after = _fma_each(load(h, weights, stages + j), rows, after)
     rows = _eight(h, y, i)
