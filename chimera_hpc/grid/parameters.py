@@ -25,7 +25,7 @@ from chimera_hpc.errors import BadInput
 
 Column = NDArray[np.int64 | np.float64]
 _MODULE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
-METHODS = ("tsit5", "dopri5", "verner6")
+METHODS = ("tsit5", "dopri5", "verner6", "kcl4")
 """Names of the integrators that a job may ask for."""
 
 

@@ -106,3 +106,20 @@ def lower_triangular(*rows: tuple[float, ...]) -> Coefficients:
     for i, row in enumerate(rows, start=1):
         a[i, : len(row)] = row
     return a
+
+
+def hermite(b: Coefficients) -> Coefficients:
+    """Weights p of the cubic that has the step's states and slopes at both ends, order 3.
+
+    ``b`` are the weights of the solution, whose last stage is the slope at the new point (HNW
+    sec. II.6, eq. 6.7).
+
+    >>> hermite(np.array([0.5, 0.5, 0.0]))
+    array([[ 1. , -0.5,  0. ],
+           [ 0. ,  1.5, -1. ],
+           [ 0. , -1. ,  1. ]])
+    """
+    p = np.outer(b, [0.0, 3.0, -2.0])
+    p[0] += 1.0, -2.0, 1.0
+    p[-1] += 0.0, -1.0, 1.0
+    return p

@@ -117,7 +117,8 @@ def test_homogeneous_states_stand_still_on_the_oriented_ring(form, which, sign):
 
 
 @pytest.mark.parametrize(
-    ("method", "rtol"), [("tsit5", 1e-9), ("dopri5", 1e-9), ("verner6", 1e-10)]
+    ("method", "rtol"),
+    [("tsit5", 1e-9), ("dopri5", 1e-9), ("verner6", 1e-10), ("kcl4", 1e-10)],
 )
 @forms
 @pytest.mark.parametrize("case", CASES)
