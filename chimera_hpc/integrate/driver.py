@@ -134,7 +134,7 @@ class Lanes:
         self.params = aligned(len(system.lane_params), lanes)
         self.params[:] = system.lane_params[:, None]
         self.y, self.y1 = aligned(rows, lanes), aligned(rows, lanes)
-        self.k = aligned(method.stages * rows, lanes)
+        self.k = aligned((method.stages + 1) * rows, lanes)
         self.weights = aligned(2 * method.stages, LANES)
         self.lane = aligned(LANE_ROWS, lanes)
         self.count = np.zeros((COUNT_ROWS, lanes), dtype=np.int64)
@@ -203,7 +203,7 @@ def choose_lanes(
 ) -> int:
     """One lane or a pack, from the number of trajectories and the memory that they take."""
     fits = LANES * _in_packs(n_observed) * n_samples * 8 <= SAMPLE_BYTES
-    fits = fits and LANES * (stages + 2) * n_rows * 8 <= PACK_BYTES
+    fits = fits and LANES * (stages + 3) * n_rows * 8 <= PACK_BYTES
     return LANES if n_trajectories >= WORTH_A_PACK and fits else 1
 
 

@@ -7,6 +7,7 @@ Notation of Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*
 secs. II.4 and II.6: ``y`` and ``y1`` are the states before and after the step, ``k`` holds the
 stages one after the other, rows ``j * rows ... (j + 1) * rows - 1`` being stage j. The first stage
 of a step is the last of the one before; instead of a copy, the two change places (``first``).
+Behind the stages is room for the errors of the rows.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from chimera_hpc.integrate.lane_rows import (
 )
 from chimera_hpc.integrate.samples import sample
 from chimera_hpc.integrate.simd import LANES, across, splat
-from chimera_hpc.integrate.stages import error_sum, stage_sum
+from chimera_hpc.integrate.stages import error_sum, last_stage_sum, stage_sum
 from chimera_hpc.status import Status
 
 # PI control (HNW sec. IV.2): the next step is h * SAFETY * err**(-EXPONENT / order) *
@@ -190,10 +191,11 @@ def _advance(
         h = across(like, lane, STEP)
         last = rows * (stages - 1) - first
         first_unit = first * units // rows
-        for s in range(1, stages):
+        for s in range(1, stages - 1):
             stage_sum(h, y, k, first_unit, units, a, s, y1)
-            o = last if s == stages - 1 else s * rows
-            rhs(y1[:size], k[o : o + size], params, ints)
+            rhs(y1[:size], k[s * rows : s * rows + size], params, ints)
+        last_stage_sum(h, y, k, first_unit, units, a, e, y1)
+        rhs(y1[:size], k[last : last + size], params, ints)
         error_sum(zero, h, y, y1, k, first_unit, units, e, rtol, atol, lane)
         rejected = _judge(lane, count, size, t_end)
         sample(

@@ -83,35 +83,51 @@ def stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, ou
 
 
 @jit()
-def _scaled(total: Any, i: Any, context: Any) -> Any:
-    h, y, y1, _, _, _, _, rtol, atol = context
+def _add_to_both(total: Any, error: Any, a: Any, e: Any, stage: Any) -> Any:
+    return fma(a, stage, total), fma(e, stage, error)
+
+
+@jit()
+def last_stage_sum(
+    h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, e: Any, out: Any
+) -> None:
+    """Write the new state as `stage_sum` does, and what is known of its errors.
+
+    The stages are read once for both. The errors, behind the stages in ``k``, are
+    ``sum_{j < s} e_j k_j``: the last stage, the slope at the new state, is still missing.
+    """
+    s = e.size - 1
+    errors = (s + 1) * units
+    if s == 6:
+        # Spelled out, as above.
+        a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
+        e0, e1, e2, e3, e4, e5 = e[0], e[1], e[2], e[3], e[4], e[5]
+        for i in range(units - 1, -1, -1):
+            stage = load(h, k, first + i)
+            total, error = a0 * stage, e0 * stage
+            total, error = _add_to_both(total, error, a1, e1, load(h, k, units + i))
+            total, error = _add_to_both(total, error, a2, e2, load(h, k, 2 * units + i))
+            total, error = _add_to_both(total, error, a3, e3, load(h, k, 3 * units + i))
+            total, error = _add_to_both(total, error, a4, e4, load(h, k, 4 * units + i))
+            total, error = _add_to_both(total, error, a5, e5, load(h, k, 5 * units + i))
+            store(k, errors + i, error)
+            store(out, i, fma(h, total, load(h, y, i)))
+        return
+    for i in range(units - 1, -1, -1):
+        stage = load(h, k, first + i)
+        total, error = a[s, 0] * stage, e[0] * stage
+        for j in range(1, s):
+            total, error = _add_to_both(total, error, a[s, j], e[j], load(h, k, j * units + i))
+        store(k, errors + i, error)
+        store(out, i, fma(h, total, load(h, y, i)))
+
+
+@jit()
+def _ratio(i: Any, context: Any) -> Any:
+    h, y, y1, k, last, errors, weight, rtol, atol = context
+    total = fma(weight, load(h, k, last + i), load(h, k, errors + i))
     size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
     return h * total / fma(rtol, size, atol)
-
-
-@jit()
-def _error_of_seven(i: Any, context: Any) -> Any:
-    # Spelled out, as above.
-    h, _, _, k, first, units, (e0, e1, e2, e3, e4, e5, e6), _, _ = context
-    total = e0 * load(h, k, first + i)
-    total = fma(e1, load(h, k, units + i), total)
-    total = fma(e2, load(h, k, 2 * units + i), total)
-    total = fma(e3, load(h, k, 3 * units + i), total)
-    total = fma(e4, load(h, k, 4 * units + i), total)
-    total = fma(e5, load(h, k, 5 * units + i), total)
-    total = fma(e6, load(h, k, 6 * units - first + i), total)
-    return _scaled(total, i, context)
-
-
-@jit()
-def _error_of_many(i: Any, context: Any) -> Any:
-    h, _, _, k, first, units, e, _, _ = context
-    last = e.size - 1
-    total = e[0] * load(h, k, first + i)
-    for j in range(1, last):
-        total = fma(e[j], load(h, k, j * units + i), total)
-    total = fma(e[last], load(h, k, last * units - first + i), total)
-    return _scaled(total, i, context)
 
 
 @jit()
@@ -120,34 +136,34 @@ def _add_square(total: Any, ratio: Any) -> Any:
 
 
 @jit(inline="always")
-def _add_up(zero: Any, term: Any, context: Any, units: Any, lane: Any) -> None:
+def _add_up(zero: Any, context: Any, units: Any, lane: Any) -> None:
     # Rows go to eight sums in turn, which are then folded in halves. One lane has its eight sums
     # side by side in a pack.
     if lane.shape[1] == 1:
         total = splat(0.0)
         for i in range(units):
-            total = _add_square(total, term(i, context))
+            total = _add_square(total, _ratio(i, context))
         lane[ERROR_SUM, 0] = fold(total)
         return
     s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
     whole = units - units % 8
     for i in range(0, whole, 8):
-        s0 = _add_square(s0, term(i, context))
-        s1 = _add_square(s1, term(i + 1, context))
-        s2 = _add_square(s2, term(i + 2, context))
-        s3 = _add_square(s3, term(i + 3, context))
-        s4 = _add_square(s4, term(i + 4, context))
-        s5 = _add_square(s5, term(i + 5, context))
-        s6 = _add_square(s6, term(i + 6, context))
-        s7 = _add_square(s7, term(i + 7, context))
+        s0 = _add_square(s0, _ratio(i, context))
+        s1 = _add_square(s1, _ratio(i + 1, context))
+        s2 = _add_square(s2, _ratio(i + 2, context))
+        s3 = _add_square(s3, _ratio(i + 3, context))
+        s4 = _add_square(s4, _ratio(i + 4, context))
+        s5 = _add_square(s5, _ratio(i + 5, context))
+        s6 = _add_square(s6, _ratio(i + 6, context))
+        s7 = _add_square(s7, _ratio(i + 7, context))
     left = units - whole
-    s0 = _add_square(s0, term(whole, context)) if left > 0 else s0
-    s1 = _add_square(s1, term(whole + 1, context)) if left > 1 else s1
-    s2 = _add_square(s2, term(whole + 2, context)) if left > 2 else s2
-    s3 = _add_square(s3, term(whole + 3, context)) if left > 3 else s3
-    s4 = _add_square(s4, term(whole + 4, context)) if left > 4 else s4
-    s5 = _add_square(s5, term(whole + 5, context)) if left > 5 else s5
-    s6 = _add_square(s6, term(whole + 6, context)) if left > 6 else s6
+    s0 = _add_square(s0, _ratio(whole, context)) if left > 0 else s0
+    s1 = _add_square(s1, _ratio(whole + 1, context)) if left > 1 else s1
+    s2 = _add_square(s2, _ratio(whole + 2, context)) if left > 2 else s2
+    s3 = _add_square(s3, _ratio(whole + 3, context)) if left > 3 else s3
+    s4 = _add_square(s4, _ratio(whole + 4, context)) if left > 4 else s4
+    s5 = _add_square(s5, _ratio(whole + 5, context)) if left > 5 else s5
+    s6 = _add_square(s6, _ratio(whole + 6, context)) if left > 6 else s6
     store(lane, ERROR_SUM, ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)))
 
 
@@ -158,10 +174,9 @@ def error_sum(
 ) -> None:  # fmt: skip
     """Sum ``(err_i / (atol + rtol max(|y_i|, |y1_i|)))**2``, HNW eq. II.4.11, over the rows.
 
-    The sum goes to the row `ERROR_SUM` of ``lane``.
+    To what `last_stage_sum` has left of the errors the last stage is added. The sum goes to the row
+    `ERROR_SUM` of ``lane``.
     """
-    if e.size == 7:
-        e7 = (e[0], e[1], e[2], e[3], e[4], e[5], e[6])
-        _add_up(zero, _error_of_seven, (h, y, y1, k, first, units, e7, rtol, atol), units, lane)
-    else:
-        _add_up(zero, _error_of_many, (h, y, y1, k, first, units, e, rtol, atol), units, lane)
+    s = e.size - 1
+    context = (h, y, y1, k, s * units - first, (s + 1) * units, e[s], rtol, atol)
+    _add_up(zero, context, units, lane)

@@ -161,7 +161,7 @@ def test_lanes_follow_the_work_and_the_memory():
     assert [choose_lanes(n, 100, 7, 50, 5001) for n in (1, 2, 3, 8)] == [1, 1, LANES, LANES]
     most = SAMPLE_BYTES // (8 * LANES * 56)  # rows of samples are whole packs
     assert [choose_lanes(8, 100, 7, 50, n) for n in (most, most + 1)] == [LANES, 1]
-    most = PACK_BYTES // (8 * LANES * 9)
+    most = PACK_BYTES // (8 * LANES * 10)
     assert [choose_lanes(8, n, 7, 50, 10) for n in (most, most + 1)] == [LANES, 1]
 
 
