@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from precision import Curve
 from projection import Costs, Forecast
 from reduction import Size
-from single import Row, Scaling
+from single import Row, Scaling, nodes_in_second_cache
 
 
 @dataclass
@@ -45,7 +45,7 @@ def text(results: Results) -> str:
             [row.words() for row in results.rows],
         )
     )
-    parts += [_ERRORS, _WHY]
+    parts += [_ERRORS, _WHY.format(nodes=nodes_in_second_cache())]
     if results.precision:
         parts += [_PICTURE]
     if results.scaling.nodes:
@@ -144,13 +144,13 @@ start {load:.1f}."""
 _WHY = """\
 What limits it:
 
-* Eight trajectories of 50 nodes fill the first cache and a little more; of 100 to 500 nodes they
-  fill a part of the second one, whose rate bounds the sums over stages. The error norm waits for
-  its divisions. That, and the work on two variables, is what limits the networked model. From about
-  850 nodes on one trajectory at a time goes along the ring. From some 15,000 its state is larger
-  than the second cache: the part of it that still stays there shrinks as the ring grows, the rest
+* Eight trajectories of 50 nodes are larger than the first cache; those of 100 to some 800 nodes are
+  in the second one, whose rate bounds the sums over stages. The error norm waits for its divisions.
+  That, and the work on two variables, is what limits the networked model. From some 800 nodes on
+  one trajectory at a time goes along the ring. When its state is larger than the second cache, here
+  from {nodes:,} nodes on, the part of it that still stays there shrinks as the ring grows; the rest
   comes from the third cache or from memory.
-* Starting Python, the cluster and its workers, planning and the reduction take some four seconds
+* Starting Python, the cluster and its workers, planning and the reduction take a few seconds
   whatever the number of points, and at the end one worker waits for the other's last block.
 * A virtual machine may change its speed by half within seconds, and a median of five turns with
   it. Rows near their target fall to either side from one call to the next."""

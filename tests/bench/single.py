@@ -21,6 +21,7 @@ from chimera_hpc.integrate import METHODS
 from chimera_hpc.integrate.driver import Control, Outcome, choose_lanes, integrate
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
+from chimera_hpc.status import Status
 
 Array = NDArray[np.float64]
 
@@ -194,30 +195,53 @@ def _compare(
     return rows
 
 
-def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[float]:
-    """Return the seconds a lane-step of eight trajectories of each ring (N0, P, steps)."""
-    taken: dict[str, int] = {}
+@dataclass(frozen=True)
+class LaneStep:
+    """What a step of one trajectory costs, and which share of the steps was accepted."""
+
+    seconds: float
+    accepted: float
+
+
+def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[LaneStep]:
+    """Return what a step costs that is tried, for eight trajectories of each ring (N0, P, steps).
+
+    The time of half of `steps` is taken off that of one and a half times as many: what is left is
+    the cost of `steps`, without beginning and end.
+    """
+    accepted: dict[str, float] = {}
 
     def run(name: str, model: TopologicalFHN, states: list[Array], steps: int) -> None:
-        control = Control(1000.0, 1000.0, 0.01, max_steps=steps)
-        ends: list[int] = []
-        integrate([model] * 8, states, control, 1, lambda _, end: ends.append(end.steps))
-        # All lanes try `steps` steps, unless they reach the end before.
-        taken[name] = sum(ends)
+        control = Control(1e6, 1e6, 0.01, max_steps=steps)
+        ends: list[Outcome] = []
+        integrate([model] * 8, states, control, 1, lambda _, end: ends.append(end))
+        assert all(end.status is Status.STEP_BUDGET for end in ends)
+        accepted[name] = sum(end.steps for end in ends) / (8 * steps)
 
+    names = [f"{n_nodes} {half_degree}" for n_nodes, half_degree, _ in rings]
     runs: dict[str, Callable[[], object]] = {}
-    for n_nodes, half_degree, steps in rings:
-        ring, name = Ring(half_degree, n_nodes), f"{n_nodes} {half_degree}"
+    for name, (n_nodes, half_degree, steps) in zip(names, rings, strict=True):
+        ring = Ring(half_degree, n_nodes)
         model = TopologicalFHN(ring.topology)
         states = [model.state(*ring.initial(seed)) for seed in range(8)]
-        runs[name] = partial(run, name, model, states, steps)
+        runs[f"{name} short"] = partial(run, f"{name} short", model, states, steps // 2)
+        runs[name] = partial(run, name, model, states, steps + steps // 2)
     times = interleaved(runs, repeats)
-    return [times[name].median / taken[name] for name in runs]
+    found = []
+    for name, (_, _, steps) in zip(names, rings, strict=True):
+        pairs = zip(times[name].seconds, times[f"{name} short"].seconds, strict=True)
+        seconds = statistics.median(long - short for long, short in pairs)
+        found.append(LaneStep(seconds / (8 * steps), accepted[name]))
+    return found
+
+
+def nodes_in_second_cache() -> int:
+    """Return the nodes of a ring whose state, stages and errors fill the second cache."""
+    return second_cache() // ((METHODS["tsit5"].stages + 3) * 2 * 8)
 
 
 def _in_second_caches(n_nodes: int) -> float:
-    """Return the size of one ring's state and stages, in second caches."""
-    return (METHODS["tsit5"].stages + 2) * 2 * n_nodes * 8 / second_cache()
+    return n_nodes / nodes_in_second_cache()
 
 
 def _by_cache(costs: Sequence[tuple[int, float]]) -> dict[str, list[tuple[int, float]]]:
@@ -238,31 +262,38 @@ def _by_cache(costs: Sequence[tuple[int, float]]) -> dict[str, list[tuple[int, f
 def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
     """Cost of a step: against dgemm, for two coupling ranges, for ever larger rings."""
     dgemm = multiplication_rate()
-    long = 10 * sizes.steps
+    long = 5 * sizes.steps
     halves = (1, 3, 6, 12, 18, 24)
     found = lane_steps([(50, half, long) for half in halves], sizes.turns)
-    costs = dict(zip(halves, found, strict=True))
-    share = FLOPS_PER_NODE * 50 / costs[12] / dgemm
-    note = f"{1e6 * costs[12]:.3f} us a lane-step; dgemm {dgemm / 1e9:.1f} GFlop/s"
+    costs = {half: step.seconds for half, step in zip(halves, found, strict=True)}
+    # Rejected steps do no useful work.
+    useful = found[halves.index(12)]
+    share = FLOPS_PER_NODE * 50 * useful.accepted / useful.seconds / dgemm
+    note = f"{1e6 * useful.seconds / useful.accepted:.3f} us an accepted lane-step, "
+    note += f"{useful.accepted:.1%} of those tried; dgemm {dgemm / 1e9:.1f} GFlop/s"
     rows = [Row("useful work of the stepping loop, of dgemm's rate", share, "", 0.25, True, note)]
     scaling.degrees = list(costs.items())
     note = ", ".join(f"P = {half}: {1e6 * cost:.3f} us" for half, cost in scaling.degrees)
     ratio = costs[24] / costs[3]
     rows.append(Row("a step at P = 24 over one at P = 3", ratio, "", 1.1, False, note))
     rings = [(n, 12, max(sizes.steps * 50 // n, 20)) for n in sizes.nodes]
-    steps = lane_steps(rings, sizes.turns)
+    steps = [step.seconds for step in lane_steps(rings, sizes.turns)]
     scaling.nodes = [(n, cost / n) for n, cost in zip(sizes.nodes, steps, strict=True)]
     note = ", ".join(f"{n}: {1e9 * cost:.2f} ns" for n, cost in scaling.nodes)
-    # Caches make steps, which are shown: within each of them the cost of a node should be level.
+    # Caches make steps, which are shown: within each of them the cost should follow a line.
     for where, part in _by_cache(scaling.nodes).items():
-        costs_there = [cost for _, cost in part]
-        what = "cost of a node and step, dearest ring over cheapest, "
-        what += f"{part[0][0]} to {part[-1][0]} nodes"
+        dearest, cheapest = (choose(cost for _, cost in part) for choose in (max, min))
+        what = f"cost of a step, {part[0][0]} to {part[-1][0]} nodes: farthest from linear"
         if where.endswith("beyond the second cache"):
             size = [_in_second_caches(n) for n, _ in (part[0], part[-1])]
             where += f", {size[0]:.1f} to {size[1]:.1f} times as large as that"
-        rows.append(Row(what, max(costs_there) / min(costs_there), "", 1.15, False, where))
-    what = f"the same over all {len(scaling.nodes)} rings, steps from cache to cache included"
+        where += f"; a node at its dearest over its cheapest {dearest / cheapest:.2f}"
+        # Relative distance from the line through the origin that is nearest to all of them.
+        farthest = (dearest - cheapest) / (dearest + cheapest)
+        rows.append(Row(what, farthest, "", 0.15, False, where))
+    what = (
+        f"cost of a node and step, dearest of {len(scaling.nodes)} rings over cheapest, all caches"
+    )
     each = [cost for _, cost in scaling.nodes]
     rows.append(Row(what, max(each) / min(each), "", None, False, note))
     return rows
