@@ -83,7 +83,10 @@ class Integrator(Table):
     """How a point is integrated."""
 
     method: Annotated[str, AfterValidator(_known_method)] = Field(
-        "tsit5", description="Runge-Kutta pair.", json_schema_extra={"enum": list(METHODS)}
+        "tsit5",
+        description="Runge-Kutta pair: of order 5 (tsit5, the paper's; dopri5), 6 (verner6), "
+        "4 (kcl4, a low-storage pair).",
+        json_schema_extra={"enum": list(METHODS)},
     )
     form: Literal["reduced", "full"] = Field(
         "reduced", description="Equations of nodes only (exact), or of nodes and links."
