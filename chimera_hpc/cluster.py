@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.errors import BadInput
+from chimera_hpc.fork_server import METHOD, ONE_THREAD, environment, is_running, quiet_tracker
 
 if TYPE_CHECKING:
     from distributed import Client, SpecCluster
@@ -21,20 +22,7 @@ LOOPBACK = "127.0.0.1"
 NO_DASHBOARD = ("--no-dashboard", "--dashboard-address", f"{LOOPBACK}:0")
 """Of a worker process: loading Bokeh would take it a second. Its server listens all the same, so it
 is told where."""
-_WARNINGS = "PYTHONWARNINGS"
 _CLOSE_SECONDS = 30.0
-
-ONE_THREAD = {
-    name: "1"
-    for name in (
-        "OMP_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-    )
-}
-"""Environment of a worker process: it computes with one thread, whatever library it calls."""
 
 
 def settings(patience: float = 60.0) -> dict[str, Any]:
@@ -113,7 +101,7 @@ def local_cluster(
             "silence_logs": logging.CRITICAL,
         },
     }
-    with dask.config.set(settings(patience)), _quiet_tracker():
+    with dask.config.set(settings(patience) | _starting()), environment(quiet_tracker()):
         cluster = SpecCluster(
             scheduler={"cls": Scheduler, "options": listening},
             workers=dict.fromkeys(range(workers or usable_cores()), worker),
@@ -163,21 +151,16 @@ def _connected(scheduler_file: Path, patience: float) -> Client:
             time.sleep(0.5)
 
 
-@contextmanager
-def _quiet_tracker() -> Iterator[None]:
-    """Keep Python from telling at the end about the semaphores of workers that were killed.
+def _starting() -> dict[str, Any]:
+    """Return how worker processes come to be: forked where a server for that is running."""
+    if not is_running():
+        return {}
+    from distributed import utils
 
-    They are cleaned up all the same, by a process that takes its orders from the environment.
-    """
-    before = os.environ.get(_WARNINGS)
-    os.environ[_WARNINGS] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_WARNINGS]
-        else:
-            os.environ[_WARNINGS] = before
+    # Otherwise Dask would import in the driver all that it would have a server of its own import.
+    if hasattr(utils, "_forkserver_preload_set"):
+        utils._forkserver_preload_set = True
+    return {"distributed.worker.multiprocessing-method": METHOD}
 
 
 def _prepare(client: Client) -> None:

@@ -60,11 +60,13 @@ LAYERS = (
     "work",
     "worker",
     "execute",
+    "fork_server",
     "cluster",
     "slurm",
     "progress",
     "commands",
     "sweep",
+    "forked",
 )
 PRINTING = ("commands", "paper.reproduce", "progress", "report", "sweep")
 

@@ -27,6 +27,7 @@ from chimera_hpc.commands.reporting import LiveReport
 from chimera_hpc.commands.resubmitting import go_on
 from chimera_hpc.commands.stopping import stop_request
 from chimera_hpc.errors import BadInput
+from chimera_hpc.fork_server import fork_server
 from chimera_hpc.grid import Sweep
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def execute(args: Namespace) -> int:
     """Run the sweep of a job file."""
-    with stop_request() as stop:
+    with stop_request() as stop, fork_server(args.cluster == "local"):
         try:
             sweep = load_job(args.job, args.overrides, args.block)
             folder = sweep_folder(args.out, sweep)

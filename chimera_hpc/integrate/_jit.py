@@ -112,3 +112,11 @@ def compile_anew(signature: Any, function: Callable[..., Any]) -> Any:
     """
     options = {"nogil": True, "error_model": "numpy", "_nrt": False}
     return _numba.njit(signature, **options)(function)
+
+
+def load_registries() -> None:
+    """Have numba read what it knows of functions, which it otherwise does for the first kernel."""
+    from numba.core.registry import cpu_target
+
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from hashlib import blake2b
 from pathlib import Path
 
-from chimera_hpc.cluster import ONE_THREAD
+from chimera_hpc.fork_server import ONE_THREAD
 from chimera_hpc.grid.tables import Slurm
 from chimera_hpc.slurm.walltime import DRAIN
 

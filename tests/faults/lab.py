@@ -91,8 +91,10 @@ class Child:
             os.killpg(self.pid, number)
 
     def workers(self) -> list[int]:
-        """Return the process numbers of its Dask workers that live."""
-        return [pid for pid in _children(self.pid) if b"spawn_main" in _command(pid)]
+        """Return the process numbers of its Dask workers that live: forked, or spawned."""
+        servers = [pid for pid in _children(self.pid) if b"forkserver" in _command(pid)]
+        forked = [pid for server in servers for pid in _children(server)]
+        return forked or [pid for pid in _children(self.pid) if b"spawn_main" in _command(pid)]
 
     def text(self) -> str:
         """Return all that it has printed so far."""

@@ -1,0 +1,39 @@
+"""What the fork server does before the first worker is forked from it; imported by it alone.
+
+A worker's first block needs all of this. None of it starts a thread: a process with threads must
+not fork.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+from importlib import import_module
+
+_MODULES = (
+    *("numpy", "chimera_hpc.grid", "numba", "chimera_hpc.task", "chimera_hpc.store"),
+    *("chimera_hpc.work", "distributed", "chimera_hpc.worker", "chimera_hpc.commands"),
+)
+"""In small steps: between them it is seen whether the driver is still there."""
+
+
+def _get_ready() -> None:
+    driver = os.getppid()
+    # A terminal sends Ctrl-C to all processes of a run; the driver stops the workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    # What is imported is no garbage, here and in the workers.
+    gc.disable()
+    for name in _MODULES:
+        if os.getppid() != driver:
+            os._exit(0)
+        import_module(name)
+    from chimera_hpc.integrate._jit import load_registries
+
+    load_registries()
+    gc.freeze()
+    gc.enable()
+
+
+_get_ready()
