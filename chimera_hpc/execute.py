@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING
 
-from chimera_hpc.work import BlockReceipt, Orders, Trouble, do_block, tell_to_stop
+from chimera_hpc.orders import BlockReceipt, Orders, Trouble, tell_to_stop
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -33,6 +33,15 @@ _COUNT_SECONDS = 2.0
 
 class ClusterLost(RuntimeError):
     """The scheduler, or every worker, is gone; what was in flight is lost, the store is not."""
+
+
+def do_block(
+    orders: Orders, block: int, local_stop: Callable[[], bool] | None = None
+) -> BlockReceipt:
+    """Do a block in this process, which loads what integrates first; see `work.do_block`."""
+    from chimera_hpc import work
+
+    return work.do_block(orders, block, local_stop)
 
 
 def run_serial(

@@ -13,7 +13,7 @@ from importlib import import_module
 
 _MODULES = (
     *("numpy", "chimera_hpc.grid", "numba", "chimera_hpc.task", "chimera_hpc.store"),
-    *("chimera_hpc.work", "distributed", "chimera_hpc.worker", "chimera_hpc.commands"),
+    *("chimera_hpc.work", "chimera_hpc.execute", "distributed", "chimera_hpc.worker"),
 )
 """In small steps: between them it is seen whether the driver is still there."""
 

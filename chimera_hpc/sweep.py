@@ -8,9 +8,8 @@ from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
 from chimera_hpc import __version__
-from chimera_hpc.commands import COMMANDS
-from chimera_hpc.commands.exits import Exit
 from chimera_hpc.errors import BadInput
+from chimera_hpc.fork_server import fork_server
 
 _EXITS = """exit status:
   0 every point has a result; 1 some failed (listed); 2 bad input (one line);
@@ -19,10 +18,15 @@ _EXITS = """exit status:
 
 _OBJECTS = 50_000
 """New objects after which Python looks for garbage."""
+_WORKING, _LOCAL = ("run", "retry"), "local"
+"""The commands that may start workers, and where they do without being told."""
+_INTERRUPTED = 130
 
 
 def parser(program: str = "python -m chimera_hpc.sweep") -> ArgumentParser:
     """Return the parser of the whole command line, called by this name."""
+    from chimera_hpc.commands import COMMANDS
+
     top = ArgumentParser(
         prog=program,
         description="Parameter sweeps of oscillator networks: integrate, store, classify, draw.",
@@ -48,8 +52,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
     # Most of what a command imports is no garbage: looking for some takes a tenth of a second.
     gc.set_threshold(_OBJECTS)
-    args = parser().parse_args(arguments)
-    args.typed = sys.argv[1:] if arguments is None else list(arguments)
+    typed = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        # The workers get ready while the commands are imported.
+        with fork_server(needs_workers(typed)):
+            return _execute(typed)
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def needs_workers(typed: Sequence[str]) -> bool:
+    """Return whether a command line is going to start a local cluster, as far as one sees."""
+    if not typed or typed[0] not in _WORKING or not {"-h", "--help"}.isdisjoint(typed):
+        return False
+    # The last one counts, as for the parser: `--cluster NAME` or `--cluster=NAME`, or shortened.
+    place = _LOCAL
+    for word, following in zip(typed, [*typed[1:], ""], strict=True):
+        name, _, given = word.partition("=")
+        if name.startswith("--c") and "--cluster".startswith(name):
+            place = given or following
+    return place == _LOCAL
+
+
+def _execute(typed: list[str]) -> int:
+    from chimera_hpc.commands.exits import Exit
+
+    args = parser().parse_args(typed)
+    args.typed = typed
     args.parser_named = parser
     try:
         return int(args.execute(args))
@@ -59,8 +88,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return Exit.COMPLETE
-    except KeyboardInterrupt:
-        return Exit.INTERRUPTED
 
 
 if __name__ == "__main__":

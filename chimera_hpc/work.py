@@ -11,7 +11,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from pathlib import Path
 
@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from chimera_hpc.claims import Claim, ClaimLost, LostAttempt, claim_block, forget_points
 from chimera_hpc.files import HOPELESS
-from chimera_hpc.grid import Points, Sweep
-from chimera_hpc.ledger import METADATA, NO_LIMIT
+from chimera_hpc.grid import Points
+from chimera_hpc.ledger import METADATA
+from chimera_hpc.orders import BlockReceipt, Orders, Trouble, tell_to_stop
 from chimera_hpc.provenance import cpu_model
 from chimera_hpc.slurm import walltime
 from chimera_hpc.status import Status
@@ -33,84 +34,6 @@ LOSSES_BEFORE_SPLIT = 2
 _STOP_LOOK_SECONDS = 0.3
 
 Rows = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Again:
-    """Which failed points are run once more, beside the points that never ran."""
-
-    attempts: int = 0
-    """Those that were tried fewer times than this."""
-    statuses: tuple[Status, ...] = (Status.TIME_OUT, Status.OUT_OF_MEMORY)
-    """Those that failed in one of these ways. Numerical failures had their further tries, under
-    tighter tolerances, inside the task; a point that killed its workers is left alone."""
-    earlier_only: bool = False
-    """Those that failed in an earlier run than the one that asks."""
-    before: int = NO_LIMIT
-    """Those that failed in a run below this number."""
-    time_out: float | None = None
-    """Seconds of wall time a point in place of `integrator.time_out`."""
-    max_steps: int | None = None
-    """Steps a point in place of `integrator.max_steps`."""
-
-    def of_run(self, run: int) -> Again:
-        """Return the same for a run that has got its number."""
-        return replace(self, before=run) if self.earlier_only else self
-
-    def applied(self, sweep: Sweep) -> Sweep:
-        """Return the sweep with these limits: they decide how far a point gets, not its numbers."""
-        limits = {"time_out": self.time_out, "max_steps": self.max_steps}
-        given = {name: limit for name, limit in limits.items() if limit is not None}
-        if not given:
-            return sweep
-        return sweep.model_copy(update={"integrator": sweep.integrator.model_copy(update=given)})
-
-
-@dataclass(frozen=True)
-class Orders:
-    """What a run tells whoever works for it."""
-
-    store: Path
-    run: int
-    again: Again = Again()
-    driver: str = ""
-    """Mark of the process that gives the orders, see `processes.process_mark`."""
-
-    @property
-    def stop_file(self) -> Path:
-        """File whose presence tells the workers of the run, wherever they are, to stop."""
-        return self.store / "runs" / f"{self.run}.stop"
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """Why a block could not be done, though none of its points is to blame as far as we know."""
-
-    text: str
-    """One line for people."""
-    trace: str
-    """The traceback, for the log."""
-    errno: int | None = None
-    """Of an error of the operating system, such as a full disk."""
-
-
-@dataclass(frozen=True)
-class BlockReceipt:
-    """What became of one block in this run: small, so that a scheduler can carry thousands."""
-
-    block: int
-    n_done: int = 0
-    n_failed: int = 0
-    seconds: float = 0.0
-    taken: bool = False
-    """Somebody else was at it."""
-    stopped: bool = False
-    """The run was told to stop before the block was whole."""
-    late: bool = False
-    """It was not begun, or not ended: too little is left of the batch job's time."""
-    trouble: Trouble | None = None
-    machine: str = ""
-    """Where it was computed."""
 
 
 @dataclass
@@ -162,12 +85,6 @@ def do_block(
     except Exception as error:
         trouble = _trouble(_in_a_line(error))
     return BlockReceipt(block, trouble=trouble, machine=_machine())
-
-
-def tell_to_stop(orders: Orders) -> None:
-    """Tell all workers of a run to stop in good order; on a full disk they find out themselves."""
-    with suppress(OSError):
-        orders.stop_file.touch()
 
 
 def hand_back_all() -> None:

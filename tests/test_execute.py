@@ -12,7 +12,7 @@ from distributed.scheduler import KilledWorker
 
 from chimera_hpc import execute
 from chimera_hpc.execute import ClusterLost, run_dask, run_serial
-from chimera_hpc.work import BlockReceipt, Orders
+from chimera_hpc.orders import BlockReceipt, Orders
 
 Outcome = BlockReceipt | BaseException | None
 """Of a block: its receipt, an error, or None when it never ends."""

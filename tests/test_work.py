@@ -16,11 +16,12 @@ from store_tools import small_sweep
 from chimera_hpc import work
 from chimera_hpc.claims import Claim, claim_block
 from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.orders import Again, Orders
 from chimera_hpc.processes import process_mark
 from chimera_hpc.status import Status
 from chimera_hpc.store import Store
 from chimera_hpc.task import BlockResult, failed_block
-from chimera_hpc.work import Again, Orders, do_block
+from chimera_hpc.work import do_block
 
 RUN = 1
 

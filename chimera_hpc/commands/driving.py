@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
     from chimera_hpc.grid.tables import Slurm
+    from chimera_hpc.orders import Again, BlockReceipt, Orders, Trouble
     from chimera_hpc.store import Store
-    from chimera_hpc.work import Again, BlockReceipt, Orders, Trouble
 
 CLUSTERS = ("serial", "local", "scheduler-file", "slurm", "allocation")
 _COMPILE_THEMSELVES = ("slurm", "allocation")
@@ -138,8 +138,8 @@ class Driver:
 
     def _start(self, n_blocks: int) -> Orders:
         """Record the run, and compile what it needs."""
-        from chimera_hpc.task import warm_up
-        from chimera_hpc.work import Orders
+        from chimera_hpc.compiled import compile_once
+        from chimera_hpc.orders import Orders
 
         store, say = self.store, self.reporter.say
         info = gather(store.sweep.model)
@@ -150,7 +150,7 @@ class Driver:
         say(f"run {run}: {n_blocks} of {store.n_blocks} blocks to do, {kind}, in {store.path}")
         if kind not in _COMPILE_THEMSELVES:
             began = time.perf_counter()
-            warm_up(store.sweep, store.points)
+            compile_once(store.sweep, store.points, load=kind == "serial")
             self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
         self.again = self.again.of_run(run)
         return Orders(store.path, run, self.again, process_mark())

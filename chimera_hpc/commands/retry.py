@@ -18,7 +18,6 @@ from chimera_hpc.commands.driving import Driver
 from chimera_hpc.commands.ending import end, interrupted
 from chimera_hpc.commands.stopping import stop_request
 from chimera_hpc.errors import BadInput
-from chimera_hpc.fork_server import fork_server
 from chimera_hpc.grid import Sweep
 from chimera_hpc.grid.parameters import nearest, short
 from chimera_hpc.grid.reading import apply_overrides
@@ -66,10 +65,10 @@ def execute(args: Namespace) -> int:
         value = getattr(args, name)
         if value is not None and not value > 0:
             raise BadInput(f"--{name.replace('_', '-')} {value}: must be above 0")
-    with stop_request() as stop, fork_server(args.cluster == "local"):
+    with stop_request() as stop:
         try:
             path = store_path(args.folder)
-            from chimera_hpc.work import Again
+            from chimera_hpc.orders import Again
 
             store = _store(path, args.overrides)
             again = Again(

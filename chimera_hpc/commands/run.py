@@ -27,7 +27,6 @@ from chimera_hpc.commands.reporting import LiveReport
 from chimera_hpc.commands.resubmitting import go_on
 from chimera_hpc.commands.stopping import stop_request
 from chimera_hpc.errors import BadInput
-from chimera_hpc.fork_server import fork_server
 from chimera_hpc.grid import Sweep
 
 if TYPE_CHECKING:
@@ -59,13 +58,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def execute(args: Namespace) -> int:
     """Run the sweep of a job file."""
-    with stop_request() as stop, fork_server(args.cluster == "local"):
+    with stop_request() as stop:
         try:
             sweep = load_job(args.job, args.overrides, args.block)
             folder = sweep_folder(args.out, sweep)
             place = place_of(args, sweep, folder / STORE)
             store = open_or_plan(folder, sweep, args.yes)
-            from chimera_hpc.work import Again
+            from chimera_hpc.orders import Again
 
             again = Again(attempts=sweep.run.attempts)
             driver = Driver(store, place, stop, folder / "run.log", again, args.strict)

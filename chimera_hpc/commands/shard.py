@@ -58,8 +58,8 @@ def execute(args: Namespace) -> int:
     share = share_of(args.index, args.of)
     with stop_request() as stop:
         try:
+            from chimera_hpc.orders import Again
             from chimera_hpc.store import Store
-            from chimera_hpc.work import Again
 
             path = _store_path(args.folder, args.out, args.overrides)
             store = Store.open(path)

@@ -4,6 +4,8 @@ numba keys its on-disk cache by the file of the compiled function alone, so a ke
 function of another file would be served stale after an edit of that other file. Here the cache
 folder carries a digest of every source file that holds kernels, so an edit anywhere in them
 starts a fresh folder.
+
+numba itself is loaded when the first kernel is declared: where the kernels lie is known without it.
 """
 
 from __future__ import annotations
@@ -19,13 +21,10 @@ import time
 import uuid
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-
-import numba
-
-# Typed loosely: numba's annotations know neither its configuration nor the option ``_nrt``.
-_numba: Any = numba
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("integrate", "models", "features")
@@ -38,7 +37,7 @@ _OLD = re.compile(r"[0-9a-f]{16}(\.[0-9a-f]{32}\.old)?")
 def source_digest() -> str:
     """Digest of the kernels' sources and of the versions that compile them (16 hex digits)."""
     digest = hashlib.blake2b(digest_size=8)
-    digest.update(f"{numba.__version__} {platform.python_version()}".encode())
+    digest.update(f"{version('numba')} {platform.python_version()}".encode())
     for folder in _KERNEL_FOLDERS:
         for file in sorted((_PACKAGE / folder).glob("*.py")):
             digest.update(file.name.encode() + file.read_bytes())
@@ -91,16 +90,17 @@ def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     stays a NaN), the GIL released, NumPy's rules for division, compiled code kept on disk, and no
     runtime for memory: a kernel that allocates doesn't compile.
     """
+    numba = _numba()
 
     def decorate(function: Callable[..., Any]) -> Any:
-        before = _numba.config.CACHE_DIR
-        _numba.config.CACHE_DIR = cache_folder()
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = cache_folder()
         try:
-            return _numba.njit(
+            return numba.njit(
                 *signature, cache=True, nogil=True, error_model="numpy", _nrt=False, **options
             )(function)
         finally:
-            _numba.config.CACHE_DIR = before
+            numba.config.CACHE_DIR = before
 
     return decorate
 
@@ -111,7 +111,7 @@ def compile_anew(signature: Any, function: Callable[..., Any]) -> Any:
     Its source, and what it calls, may be edited between two processes at any time.
     """
     options = {"nogil": True, "error_model": "numpy", "_nrt": False}
-    return _numba.njit(signature, **options)(function)
+    return _numba().njit(signature, **options)(function)
 
 
 def load_registries() -> None:
@@ -120,3 +120,8 @@ def load_registries() -> None:
 
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
+
+
+def _numba() -> Any:
+    # Typed loosely: numba's annotations know neither its configuration nor the option ``_nrt``.
+    return import_module("numba")

@@ -13,9 +13,9 @@ from projection import Costs
 from chimera_hpc.execute import run_dask
 from chimera_hpc.grid import Sweep
 from chimera_hpc.ledger import read_ledger
+from chimera_hpc.orders import Orders
 from chimera_hpc.store import Store
 from chimera_hpc.task import run_block, warm_up
-from chimera_hpc.work import Orders
 
 QUICKSTART = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 

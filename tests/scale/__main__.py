@@ -168,8 +168,9 @@ def serial_rate(folder: Path) -> float:
     sys.path.insert(0, str(FOLDER))
     import nothing  # noqa: F401
 
+    from chimera_hpc.orders import Orders
     from chimera_hpc.store import Store
-    from chimera_hpc.work import Orders, do_block
+    from chimera_hpc.work import do_block
 
     path = plan(folder, "serial", SMALL).path
     orders, n_blocks = Orders(path, 1), Store.open(path).n_blocks
@@ -186,8 +187,8 @@ def scheduler_memory(folder: Path, path: Path) -> int:
     from distributed import Client
 
     from chimera_hpc.execute import run_dask
+    from chimera_hpc.orders import Orders
     from chimera_hpc.store import Store
-    from chimera_hpc.work import Orders
 
     store = Store.open(path)
     done = []

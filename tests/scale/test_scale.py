@@ -14,10 +14,11 @@ from programs import SCALE, load_program
 from chimera_hpc import work
 from chimera_hpc.grid import Points, Sweep
 from chimera_hpc.ledger import FIELDS, chunk_name, seal
+from chimera_hpc.orders import Orders
 from chimera_hpc.status import Status
 from chimera_hpc.store import Store
 from chimera_hpc.task import BlockResult, failed_block
-from chimera_hpc.work import Orders, do_block
+from chimera_hpc.work import do_block
 
 MILLION = 1_000_000
 
