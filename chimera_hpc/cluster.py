@@ -6,8 +6,9 @@ import json
 import logging
 import os
 import signal
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,6 +70,7 @@ def local_cluster(
     patience: float = 60.0,
     scratch: Path | None = None,
     memory_limit: str | None = "auto",
+    meanwhile: Callable[[], object] | None = None,
 ) -> Iterator[Client]:
     """Start one-thread worker processes on this machine and give a client of them.
 
@@ -85,9 +87,14 @@ def local_cluster(
         Folder for the workers' own files; a temporary one by default.
     memory_limit : str, optional
         Memory at which a worker is ended and replaced; a share of the machine's by default.
+    meanwhile : callable, optional
+        What to do in a thread while the workers start: this process only waits for them.
     """
     import dask
     from distributed import Client, Nanny, Scheduler, SpecCluster
+
+    if meanwhile is not None:
+        threading.Thread(target=meanwhile, daemon=True).start()
 
     # As `NO_DASHBOARD` says it on a command line.
     listening = {"host": LOOPBACK, "dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}

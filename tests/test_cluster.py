@@ -6,6 +6,7 @@ import shlex
 import signal
 import subprocess
 import sys
+from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
@@ -97,3 +98,9 @@ class FakeClient:
 
     def register_plugin(self, plugin: Any) -> None:
         self.plugins.append(plugin)
+
+
+def test_something_is_done_while_the_workers_start() -> None:
+    done = Event()
+    with local_cluster(1, meanwhile=done.set):
+        assert done.wait(timeout=30)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.claims import live_claims
-from chimera_hpc.commands.reporting import LiveReport
+from chimera_hpc.commands.reporting import LiveReport, load_reduction
 from chimera_hpc.commands.stopping import StopRequest
 from chimera_hpc.errors import BadInput
 from chimera_hpc.files import HOPELESS
@@ -212,8 +212,12 @@ class Driver:
             with existing_cluster(place.scheduler_file, patience=patience) as client:
                 yield client
         else:
-            memory = place.memory or "auto"
-            with local_cluster(place.workers, patience=patience, memory_limit=memory) as client:
+            with local_cluster(
+                place.workers,
+                patience=patience,
+                memory_limit=place.memory or "auto",
+                meanwhile=load_reduction,
+            ) as client:
                 yield client
 
     def _in_time(self, blocks: list[int]) -> Iterator[int]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 LIVE_SECONDS = 60.0
@@ -29,6 +31,13 @@ def reduce_and_report(folder: Path, make_figures: bool) -> None:
 
         report = write_report(folder)
         print(f"report   {report.path} ({report.size / 1e6:.1f} MB)")
+
+
+def load_reduction() -> None:
+    """Import what reduces a sweep, before it is needed."""
+    # An import that fails is heard of when it is needed.
+    with suppress(Exception):
+        import_module("chimera_hpc.outputs.reduction")
 
 
 class LiveReport:
