@@ -18,11 +18,14 @@ _MODULES = (
 """In small steps: between them it is seen whether the driver is still there."""
 
 
+_OUTLIVED = (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+"""What a batch system sends to all processes of a job: workers take it each in its own way, and the
+driver would give them up without their server."""
+
+
 def _get_ready() -> None:
     driver = os.getppid()
-    # A terminal sends Ctrl-C to all processes of a run; the driver stops the workers.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    _take_signals()
     # What is imported is no garbage, here and in the workers.
     gc.disable()
     for name in _MODULES:
@@ -34,6 +37,22 @@ def _get_ready() -> None:
     load_registries()
     gc.freeze()
     gc.enable()
+
+
+def _take_signals() -> None:
+    # A terminal sends Ctrl-C to all processes of a run; the driver stops the workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    taken = [number for number in _OUTLIVED if signal.getsignal(number) == signal.SIG_DFL]
+    for number in taken:
+        signal.signal(number, signal.SIG_IGN)
+
+    def as_before() -> None:
+        for number in taken:
+            if signal.getsignal(number) == signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)
+
+    os.register_at_fork(after_in_child=as_before)
 
 
 _get_ready()

@@ -52,15 +52,15 @@ def look():
         "threads of the server": len(list((server / "task").iterdir())),
         # Dask marks its children, for the sake of their titles.
         "environment": {k: v for k, v in os.environ.items() if k != "__DASK_PARENT_PID"},
-        "Ctrl-C": signal.getsignal(signal.SIGINT) == signal.SIG_IGN,
+        "ignored": [n for n in signal.valid_signals() if signal.getsignal(n) == signal.SIG_IGN],
         "numba knows": len(cpu_target.target_context._registries),
         "loaded": "chimera_hpc.work" in sys.modules,
     }
 
+before = dict(os.environ)
 with fork_server(sys.argv[1] == "forked"):
-    before = dict(os.environ)
+    same = dict(os.environ) == before
     with local_cluster(1) as client:
-        same = dict(os.environ) | before == dict(os.environ)
         (found,) = client.run(look).values()
 print(json.dumps(found | {"driver as before": same}))
 """
@@ -93,7 +93,8 @@ def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() ->
     assert forked["threads of the server"] == 1
     assert forked["loaded"]
     assert forked["numba knows"] > 0
-    assert forked["Ctrl-C"]
+    assert signal.SIGINT in forked["ignored"]
+    assert forked["ignored"] == spawned["ignored"]
     assert forked["driver as before"]
 
 
@@ -219,6 +220,22 @@ def test_server_and_workers_end_with_a_killed_driver(running: subprocess.Popen[s
     assert len(family) >= 3
     running.kill()
     assert psutil.wait_procs(family, timeout=30)[1] == []
+
+
+@linux
+def test_server_outlives_what_a_batch_system_sends_to_all_processes(
+    running: subprocess.Popen[str],
+) -> None:
+    (server,) = servers(running.pid)
+    workers = wait_for(lambda: len(server.children()) == 2 and server.children())
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1):
+        server.send_signal(number)
+    time.sleep(0.5)
+    assert server.children() == workers
+    running.send_signal(signal.SIGTERM)
+    output, _ = running.communicate(timeout=60)
+    assert running.returncode == 75, output
+    assert psutil.wait_procs([server, *workers], timeout=30)[1] == []
 
 
 @linux
