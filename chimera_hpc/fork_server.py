@@ -25,6 +25,8 @@ ONE_THREAD = {
 METHOD = "forkserver"
 _HASH_SEED = {"PYTHONHASHSEED": "6640"}
 """The seed that Dask gives each worker process."""
+IS_SERVER = "CHIMERA_HPC_FORK_SERVER"
+"""Variable that tells a fork server's process what it is; no worker has it."""
 _READY_MADE = ["chimera_hpc.forked"]
 
 
@@ -97,7 +99,7 @@ def _start() -> None:
 
     # What a user has set counts, as with Dask.
     threads = {name: os.environ.get(name, value) for name, value in ONE_THREAD.items()}
-    with environment({**threads, **_HASH_SEED, **quiet_tracker()}):
+    with environment({**threads, **_HASH_SEED, **quiet_tracker(), IS_SERVER: "1"}):
         # First, for its start lets Ctrl-C through again.
         resource_tracker.ensure_running()
         _server().set_forkserver_preload(_READY_MADE)

@@ -1,4 +1,4 @@
-"""What the fork server does before the first worker is forked from it; imported by it alone.
+"""What the fork server does before the first worker is forked from it, when it imports this.
 
 A worker's first block needs all of this. None of it starts a thread: a process with threads must
 not fork.
@@ -11,12 +11,13 @@ import os
 import signal
 from importlib import import_module
 
+from chimera_hpc.fork_server import IS_SERVER
+
 _MODULES = (
     *("numpy", "chimera_hpc.grid", "numba", "chimera_hpc.task", "chimera_hpc.store"),
     *("chimera_hpc.work", "chimera_hpc.execute", "distributed", "chimera_hpc.worker"),
 )
 """In small steps: between them it is seen whether the driver is still there."""
-
 
 _OUTLIVED = (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 """What a batch system sends to all processes of a job: workers take it each in its own way, and the
@@ -55,4 +56,6 @@ def _take_signals() -> None:
     os.register_at_fork(after_in_child=as_before)
 
 
-_get_ready()
+# Whoever imports this otherwise, as tools do that look at all modules, keeps his signals.
+if os.environ.pop(IS_SERVER, None) is not None:
+    _get_ready()

@@ -98,6 +98,16 @@ def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() ->
     assert forked["driver as before"]
 
 
+def test_who_imports_it_otherwise_keeps_his_signals() -> None:
+    code = (
+        "import signal\n"
+        "before = [signal.getsignal(n) for n in signal.valid_signals()]\n"
+        "import chimera_hpc.forked\n"
+        "assert [signal.getsignal(n) for n in signal.valid_signals()] == before\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
 def test_environment_is_changed_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CHIMERA_THERE", "before")
     monkeypatch.delenv("CHIMERA_NEW", raising=False)
