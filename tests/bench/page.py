@@ -174,7 +174,7 @@ would write; reduced form: the exact reduction that this package uses."""
 
 _PICTURE = """![Work against precision](images/performance.png)"""
 
-_PRICED = (1e-2, 1e-4, 1e-6, 1e-8)
+_PRICED = (1e-2, 1e-4, 1e-6)
 _PRECISION = """\
 Of the methods of this package Tsit5 is the default, as in the paper; a job or a call may ask for
 another one. Time of a trajectory of 20 units, u every 0.01, for some errors, read off the curves

@@ -227,11 +227,24 @@ def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[Lane
         runs[f"{name} short"] = partial(run, f"{name} short", model, states, steps // 2)
         runs[name] = partial(run, name, model, states, steps + steps // 2)
     times = interleaved(runs, repeats)
-    found = []
-    for name, (_, _, steps) in zip(names, rings, strict=True):
-        pairs = zip(times[name].seconds, times[f"{name} short"].seconds, strict=True)
-        seconds = statistics.median(long - short for long, short in pairs)
-        found.append(LaneStep(seconds / (8 * steps), accepted[name]))
+    spent = [
+        np.subtract(times[name].seconds, times[f"{name} short"].seconds) / (8 * steps)
+        for name, (_, _, steps) in zip(names, rings, strict=True)
+    ]
+    return [
+        LaneStep(seconds, accepted[name])
+        for name, seconds in zip(names, typical(np.array(spent)), strict=True)
+    ]
+
+
+def typical(spent: Array) -> list[float]:
+    """Return the medians over rounds of what contenders (n, rounds) take.
+
+    The medians are those of their shares of a round, times that of a round: a machine that is
+    slower in some rounds than in others changes no ratio.
+    """
+    rounds = spent.sum(axis=0)
+    found: list[float] = (np.median(spent / rounds, axis=1) * np.median(rounds)).tolist()
     return found
 
 

@@ -52,6 +52,16 @@ def test_peers_solve_the_same_problem(bench):
         assert problems.error(u, reference) < 1e-5
 
 
+def test_slow_rounds_change_no_ratio(bench):
+    speed = np.array([1.0, 1.0, 1.7, 0.6, 1.7])
+    found = bench("single").typical(np.outer([2.0, 3.0, 6.0], speed))
+    assert found == pytest.approx([2.0, 3.0, 6.0])
+    # One contender alone disturbed in one round: no more than its median feels.
+    spent = np.outer([2.0, 3.0, 6.0], np.ones(5))
+    spent[1, 2] = 30.0
+    assert bench("single").typical(spent) == pytest.approx([2.0, 3.0, 6.0])
+
+
 def test_a_projection_without_costs_is_ideal(bench):
     projection = bench("projection")
     costs = projection.Costs(0.02, 0.0, 0.0, 0.0)
