@@ -11,7 +11,7 @@ from pathlib import Path
 
 from chimera_hpc.files import write_atomically
 from chimera_hpc.grid import Points, Sweep
-from chimera_hpc.integrate._jit import cache_folder
+from chimera_hpc.integrate._jit import cache_folder, kernel_sources
 from chimera_hpc.provenance import PACKAGE, cpu_model
 
 _DECIDING = ("model", "fixed", "integrator", "features", "keep")
@@ -64,12 +64,7 @@ def _mark(sweep: Sweep) -> Path:
     spec = sweep.to_dict()
     deciding = [spec.get(name) for name in _DECIDING]
     numbas = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_")}
-    parts = [deciding, sorted(spec["grid"]), cpu_model(), numbas, str(PACKAGE), _times()]
+    times = [file.stat().st_mtime_ns for file in kernel_sources()]
+    parts = [deciding, sorted(spec["grid"]), cpu_model(), numbas, str(PACKAGE), times]
     digest = blake2b(json.dumps(parts, sort_keys=True, default=str).encode(), digest_size=8)
     return Path(cache_folder()) / f"compiled-{digest.hexdigest()}"
-
-
-def _times() -> list[int]:
-    folders = ("integrate", "models", "features")
-    files = (file for name in folders for file in sorted((PACKAGE / name).glob("*.py")))
-    return [file.stat().st_mtime_ns for file in files]

@@ -38,10 +38,14 @@ def source_digest() -> str:
     """Digest of the kernels' sources and of the versions that compile them (16 hex digits)."""
     digest = hashlib.blake2b(digest_size=8)
     digest.update(f"{version('numba')} {platform.python_version()}".encode())
-    for folder in _KERNEL_FOLDERS:
-        for file in sorted((_PACKAGE / folder).glob("*.py")):
-            digest.update(file.name.encode() + file.read_bytes())
+    for file in kernel_sources():
+        digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()
+
+
+def kernel_sources() -> list[Path]:
+    """Return the source files that hold kernels."""
+    return [file for name in _KERNEL_FOLDERS for file in sorted((_PACKAGE / name).glob("*.py"))]
 
 
 @cache
