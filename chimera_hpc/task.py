@@ -24,6 +24,7 @@ from chimera_hpc.features import (
 )
 from chimera_hpc.features.series import by_node, quantise, round_to
 from chimera_hpc.grid import Points, Sweep
+from chimera_hpc.integrate.beside import stepping_loops_beside
 from chimera_hpc.integrate.driver import Control, Outcome, Stopped, integrate
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.layout import MISSING, SCALE, sample_times, scalar_labels, series_mask
@@ -288,10 +289,17 @@ def warm_up(sweep: Sweep, points: Points) -> None:
     Called once before workers start, so that they find everything compiled.
     """
     model = build(sweep, points.row(0))
+    with stepping_loops_beside():
+        _warm_up_the_rest(sweep, model)
     state = model.state(*initial_state(sweep, points.row(0), model))
     control = Control(t_end=0.02, start=0.0, step=0.01, method=sweep.integrator.method)
     for lanes in (1, LANES):
         integrate([model], [state], control, model.n_rows, lambda *_: None, lanes=lanes)
+
+
+def _warm_up_the_rest(sweep: Sweep, model: Model) -> None:
+    # Compiled, or read from the disk, when it is first asked for.
+    _ = model.right_hand_side
     t = 0.01 * np.arange(2000.0)
     rows = np.sin(2.0 * np.pi * t + np.arange(3.0)[:, None])
     spec = sweep.features

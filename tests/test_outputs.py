@@ -55,6 +55,14 @@ def told(folder: Path, **options):
     return reduce_sweep(folder, say=lines.append, **options), lines
 
 
+def test_reduction_that_needs_no_run_loads_no_kernels(tmp_path):
+    filled(tmp_path, FAST, 'reduction.analyses=["oscillation"]')
+    code = "import sys; from pathlib import Path; from chimera_hpc.outputs import reduce_sweep\n"
+    code += "reduce_sweep(Path(sys.argv[1]), make_figures=False); assert 'numba' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code, tmp_path], check=True)
+    assert "oscillation" in results_in(tmp_path)["curves"]
+
+
 def test_finished_sweep_gives_classes_counts_and_paths(tmp_path):
     filled(tmp_path, FAST)
     summary, lines = told(tmp_path)

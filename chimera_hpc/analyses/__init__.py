@@ -8,32 +8,39 @@ existing figure fits, one in `chimera_hpc.figures`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from chimera_hpc.analyses.given import Given
-from chimera_hpc.analyses.incoherence import agreement, incoherence, sigma_l
-from chimera_hpc.analyses.judged import atlas, robustness
-from chimera_hpc.analyses.method import spectrum, synthetic, variations
-from chimera_hpc.analyses.ring import basin, networks, oscillation, stability
 from chimera_hpc.errors import BadInput
 
 __all__ = ["ANALYSES", "Given", "analyse"]
 
 Analysis = Callable[[Given], dict[str, Any]]
 
+
+def _in(module: str, name: str) -> Analysis:
+    # Loaded when it is asked for: some need compiled kernels, which take half a second to load.
+    def made(given: Given) -> dict[str, Any]:
+        analysis: Analysis = getattr(import_module(f"{__name__}.{module}"), name)
+        return analysis(given)
+
+    return made
+
+
 ANALYSES: dict[str, Analysis] = {
-    "networks": networks,
-    "stability": stability,
-    "basin": basin,
-    "oscillation": oscillation,
-    "variations": variations,
-    "atlas": atlas,
-    "robustness": robustness,
-    "incoherence": incoherence,
-    "sigma-l": sigma_l,
-    "agreement": agreement,
-    "synthetic": synthetic,
-    "spectrum": spectrum,
+    "networks": _in("ring", "networks"),
+    "stability": _in("ring", "stability"),
+    "basin": _in("ring", "basin"),
+    "oscillation": _in("ring", "oscillation"),
+    "variations": _in("method", "variations"),
+    "atlas": _in("judged", "atlas"),
+    "robustness": _in("judged", "robustness"),
+    "incoherence": _in("incoherence", "incoherence"),
+    "sigma-l": _in("incoherence", "sigma_l"),
+    "agreement": _in("incoherence", "agreement"),
+    "synthetic": _in("method", "synthetic"),
+    "spectrum": _in("method", "spectrum"),
 }
 _NEED_ATLAS = ("atlas", "robustness")
 _NEED_RUNS = ("sigma-l", "agreement", "incoherence", "variations", "spectrum")

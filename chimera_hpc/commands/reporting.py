@@ -16,6 +16,11 @@ _LIVE_PICTURES = 60
 _LIVE_TREE = 2_000
 _LIVE_POINTS = 50_000
 """A larger sweep gets its report at the end only: reading all its results takes too long."""
+_REDUCING = (
+    *("chimera_hpc.outputs.reduction", "chimera_hpc.outputs.atlases"),
+    *("chimera_hpc.analyses.ring", "fastcluster"),
+)
+"""What every reduction loads, or most of them."""
 
 
 def reduce_and_report(folder: Path, make_figures: bool) -> None:
@@ -37,7 +42,8 @@ def load_reduction() -> None:
     """Import what reduces a sweep, before it is needed."""
     # An import that fails is heard of when it is needed.
     with suppress(Exception):
-        import_module("chimera_hpc.outputs.reduction")
+        for name in _REDUCING:
+            import_module(name)
 
 
 class LiveReport:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.files import remove_leftovers, temporary_name, write_atomically
 from chimera_hpc.layout import sample_times
@@ -153,7 +154,12 @@ class _Work:
             return {}
         from chimera_hpc.analyses import Given, analyse
         from chimera_hpc.outputs.atlases import atlases_of
-        from chimera_hpc.outputs.runs import series_of
+
+        def series(i: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            # Few analyses ask for it; what reads a run loads the kernels.
+            from chimera_hpc.outputs.runs import series_of
+
+            return sample_times(store.sweep), series_of(store, i)
 
         self.atlases = atlases_of(self.folder, spec.atlas, self.note)
         given = Given(
@@ -164,7 +170,7 @@ class _Work:
             classification=self.classification,
             cut=self.classification.cuts[self.cuts[0]],
             atlases=self.atlases,
-            series=lambda i: (sample_times(store.sweep), series_of(store, i)),
+            series=series,
         )
         return analyse(given, self.note)
 
