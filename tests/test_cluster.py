@@ -75,6 +75,18 @@ def _milliseconds_between_looks(dask_worker: Any) -> dict[str, float]:
     return {name: call.callback_time for name, call in dask_worker.periodic_callbacks.items()}
 
 
+@pytest.mark.parametrize(("patience", "seconds"), [(60.0, 5.0), (12.0, 1.0), (1.0, 0.5)])
+def test_workers_say_seldom_that_they_are_there(patience: float, seconds: float) -> None:
+    with local_cluster(1, patience=patience) as client:
+        (found,) = client.run(_heartbeat_seconds).values()
+    assert found == seconds
+
+
+async def _heartbeat_seconds(dask_worker: Any) -> float:
+    await dask_worker.heartbeat()
+    return float(dask_worker.periodic_callbacks["heartbeat"].callback_time) / 1000
+
+
 def test_workers_in_other_jobs_get_the_settings_of_their_kind() -> None:
     theirs = ("distributed.worker.", "distributed.admin.")
     ours = {name: value for name, value in settings().items() if name.startswith(theirs)}

@@ -106,6 +106,9 @@ def scaling_picture(scaling: Scaling) -> Figure:
     figure = Figure(figsize=(9, 7), layout="constrained")
     workers, points, nodes, degrees = figure.subplots(2, 2).flat
     _measured(workers, scaling.workers, "the plane: workers", "s, whole command", power=-1)
+    # Less than a decade: the logarithmic axis alone has no number there.
+    seconds = [each for _, each in scaling.workers]
+    workers.set_yticks(seconds, [f"{each:.0f}" for each in seconds])
     _measured(points, scaling.points, "two workers: points", "s, whole command", power=1, at=-1)
     whole = [(n, 1e6 * n * each) for n, each in scaling.nodes]
     _measured(nodes, whole, "P = 12: nodes", "µs a step and trajectory", power=1)
@@ -146,8 +149,9 @@ _HEAD = """# Measured performance
     scripts/bench --write
 
 measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
-interleaved turns, of at least a second for each contender where peers are in the row; means of
-whole commands and bare blocks that take turns there and back; one core unless workers are named.
+interleaved turns, of at least a second for each contender where peers are in the row. Whole
+commands and bare blocks run by turns of a tenth of a second, one standing still while the other
+runs, each charged with its own turns. One core unless workers are named.
 Machine: {machine}; load average at the
 start {load:.1f}."""
 
@@ -162,8 +166,8 @@ What limits it:
   comes from the third cache or from memory.
 * Starting Python, the cluster and its workers, planning and the reduction take a few seconds
   whatever the number of points, and at the end one worker waits for the other's last block.
-* A virtual machine may change its speed by half within seconds, and a median of five turns with
-  it. Rows near their target fall to either side from one call to the next."""
+* A virtual machine may change its speed by half within seconds: medians of five turns change with
+  it, and such rows fall to either side of a target that is near from one call to the next."""
 
 _ERRORS = """\
 *Error* is the largest difference of u from a DOP853 solution at rtol 1e-13, up to t = 20

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import statistics
 import subprocess
@@ -12,19 +11,20 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 from programs import SCALE, load_program
 from single import Row, Scaling
+from turns import Program, take_turns
 
 ROOT = Path(__file__).parents[2]
 PLANE = ROOT / "jobs" / "paper" / "plane.toml"
 MB = 1e6
 _SWEEP = (sys.executable, "-P", "-m", "chimera_hpc.sweep")
 _BARE = """
-import sys
+import os, sys
 from chimera_hpc.grid import Sweep
 from chimera_hpc.grid.blocks import block_size, blocks
 from chimera_hpc.task import run_block, warm_up
@@ -33,12 +33,16 @@ job, share, shares, *settings = sys.argv[1:]
 sweep = Sweep.load(job, settings)
 points = sweep.points()
 warm_up(sweep, points)
-print("begin", flush=True)
+print("ready", flush=True)
+sys.stdin.readline()
 cuts = blocks(len(points), block_size(sweep, len(points)))
 for start, stop in cuts[int(share) :: int(shares)]:
     run_block(sweep, points[slice(start, stop)])
-print("end", flush=True)
+os._exit(0)
 """
+_TURN = 0.1
+"""Seconds that a program runs before it is the other one's turn: a virtual machine may change its
+speed within a second."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,6 @@ class Watched:
     """Most memory that a process of it held, bytes."""
     first: float
     """Seconds until the first finished point; NaN where none was waited for."""
-    blocks: float = float("nan")
-    """Seconds that the workers of a sweep spent in its blocks, all together."""
 
 
 def watched(
@@ -79,81 +81,63 @@ def watched(
     return Watched(time.perf_counter() - began, peak, first)
 
 
-def bare(job: Path, shares: int, settings: list[str]) -> float:
-    """Return the seconds that the blocks take without executor and store, in `shares` processes."""
-    command = [sys.executable, "-P", "-c", _BARE, str(job)]
-    processes = [
-        subprocess.Popen(
-            [*command, str(k), str(shares), *settings], stdout=subprocess.PIPE, text=True
-        )
-        for k in range(shares)
-    ]
-    began = ended = 0.0
-    for process in processes:
-        assert process.stdout is not None
-        process.stdout.readline()
-    began = time.perf_counter()
-    for process in processes:
-        assert process.stdout is not None
-        with process.stdout as output:
-            output.readline()
-        process.wait()
-        ended = time.perf_counter()
-    return ended - began
-
-
 def workers(
     folder: Path, settings: list[str], seeds: tuple[int, ...], scaling: Scaling
 ) -> list[Row]:
     """The plane with one worker and with two, and its blocks without executor and store."""
     options = [word for setting in settings for word in ("--set", setting)]
+    run = [*_SWEEP, "run", str(PLANE), *options]
     # The first run is not measured: it may have to compile the kernels.
     for k, n in enumerate((seeds[0], *seeds)):
         out = folder / f"plane-seeds-{n}-{k}"
-        command = [*_SWEEP, "run", str(PLANE), "--out", str(out), *options, "--set", f"seeds={n}"]
-        seconds = watched([*command, "--workers", "2", "--no-figures"]).seconds
+        command = [*run, "--set", f"seeds={n}", "--out", str(out), "--workers", "2", "--no-figures"]
+        seconds = watched(command).seconds
         if k > 0:
             scaling.points.append((_points(out), seconds))
-    whole: dict[int, list[Watched]] = {1: [], 2: []}
-    without: dict[int, list[float]] = {1: [], 2: []}
-    # There and back again: a machine that slows down or speeds up meets both sides alike.
-    for n, is_whole in ((2, True), (2, False), (1, True), (1, False), (2, False), (2, True)):
-        if is_whole:
-            out = folder / f"plane-{n}-{len(whole[n])}"
-            command = [*_SWEEP, "run", str(PLANE), "--workers", str(n), "--out", str(out), *options]
-            run = watched([*command, "--no-figures"])
-            whole[n].append(replace(run, blocks=_in_blocks(out / "run.log")))
-        else:
-            without[n].append(bare(PLANE, n, settings))
-    runs = {n: statistics.mean(run.seconds for run in found) for n, found in whole.items()}
-    alone = {n: statistics.mean(seconds) for n, seconds in without.items()}
-    full = watched([*_SWEEP, "run", str(PLANE), "--out", str(folder / "plane"), *options])
-    gain, limit = runs[1] / runs[2], alone[1] / alone[2]
-    cost = {n: runs[n] / alone[n] - 1.0 for n in (1, 2)}
-    note = f"{runs[1]:.1f} s and {runs[2]:.1f} s; "
-    note += f"without executor and store {alone[1]:.1f} s and {alone[2]:.1f} s ({limit:.2f} times)"
-    both = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%}: start, planning, reduction included; "
-    within = {
-        n: sum(run.seconds for run in found) / sum(run.blocks / n for run in found) - 1.0
-        for n, found in whole.items()
-    }
-    both += "over the seconds that its own workers spent in blocks, whatever the machine's speed "
-    both += f"from one run to the next, {within[1]:.1%} and {within[2]:.1%}"
+    whole = {n: _whole(run, folder, n) for n in (1, 2)}
+    cost = {n: _over(whole[n], _bare_blocks(n, settings)) - 1.0 for n in (2, 1)}
+    alone = {n: _bare_blocks(n, settings) for n in (1, 2)}
+    # Only those of a pair are compared, for the machine may change from pair to pair. One process
+    # gets longer turns, so that both of its pair end at about the same time.
+    alone[1].share = 2.0
+    limit = _over(alone[1], alone[2])
+    gain = limit * (1.0 + cost[1]) / (1.0 + cost[2])
+    full = watched([*run, "--out", str(folder / "plane"), "--workers", "2"])
+    note = f"{limit:.2f} times without executor and store, each process every second block "
+    note += f"({alone[1].seconds:.1f} s and {alone[2].seconds:.1f} s); with them, see the next row"
+    both = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%} ({whole[2].seconds:.1f} s): "
+    both += "start, planning, reduction included"
     size = _points(folder / "plane")
-    peak = max(run.peak for run in whole[2])
-    scaling.workers = list(runs.items())
-    scaling.points.append((size, runs[2]))
+    # As if both had met the machine that the one with two workers met.
+    scaling.workers = [(1, gain * whole[2].seconds), (2, whole[2].seconds)]
+    scaling.points.append((size, whole[2].seconds))
     return [
         Row("2 workers over 1, whole command", gain, "times", 1.9, True, note),
         Row("whole command over bare blocks, minus one", max(cost.values()), "", 0.05, False, both),
-        Row("largest worker process", peak / MB, "MB", 320.0, False),
+        Row("largest worker process", full.peak / MB, "MB", 320.0, False),
         Row(f"the {size}-point plane, 2 workers, figures included", full.seconds / 60, "minutes",
             6.0, False),
     ]  # fmt: skip
 
 
-def _in_blocks(log: Path) -> float:
-    return sum(map(float, re.findall(r"block \d+: .* failed, ([0-9.]+) s", log.read_text())))
+def _whole(run: list[str], folder: Path, n: int) -> Program:
+    out = ["--out", str(folder / f"plane-{n}"), "--workers", str(n), "--no-figures"]
+    return Program([[*run, *out]])
+
+
+def _bare_blocks(n: int, settings: list[str]) -> Program:
+    """The blocks in n processes, and nothing else."""
+    return Program([_bare(PLANE, k, n, settings) for k in range(n)], prepares=True)
+
+
+def _over(first: Program, second: Program) -> float:
+    """Seconds of a program over those of another one, measured by turns."""
+    take_turns([first, second], _TURN)
+    return first.seconds / second.seconds
+
+
+def _bare(job: Path, share: int, shares: int, settings: list[str]) -> list[str]:
+    return [sys.executable, "-P", "-c", _BARE, str(job), str(share), str(shares), *settings]
 
 
 def _points(out: Path) -> int:
@@ -167,8 +151,9 @@ def memory(t_ends: tuple[float, float]) -> list[Row]:
     peaks = []
     for t_end in t_ends:
         settings = ["P=12", "seeds=8", f"integrator.t_end={t_end}", f"features.start={t_end - 50}"]
-        command = [sys.executable, "-P", "-c", _BARE, str(ROOT / "jobs" / "quickstart.toml")]
-        process = subprocess.Popen([*command, "0", "1", *settings], stdout=subprocess.DEVNULL)
+        command = _bare(ROOT / "jobs" / "quickstart.toml", 0, 1, settings)
+        none = subprocess.DEVNULL
+        process = subprocess.Popen(command, stdin=none, stdout=none)
         peak = 0
         while process.poll() is None:
             peak = max(peak, peak_memory(process.pid))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import json
 import os
 import subprocess
@@ -76,3 +77,44 @@ def test_a_scheduler_too_slow_for_its_cores_sets_the_pace(bench):
     found = projection.forecast(costs, 100, 1_000, 1, scheduler=True, spread=0.0)
     assert found.hours * 3600 == pytest.approx(10.0, rel=0.01)
     assert found.scheduler_load > 0.99
+
+
+WORK = "import time; end = time.thread_time() + {seconds}\nwhile time.thread_time() < end: pass"
+
+
+def script(text: str) -> list[str]:
+    return [sys.executable, "-c", text]
+
+
+def test_programs_by_turns_are_charged_for_their_own_turns(bench):
+    turns = bench("turns")
+    ready = "print('ready', flush=True); input(); "
+    long, short = (
+        turns.Program([script(ready + WORK.format(seconds=s))], prepares=True) for s in (1.2, 0.4)
+    )
+    turns.take_turns([long, short], 0.05)
+    assert long.seconds >= 1.2
+    assert 0.4 <= short.seconds < long.seconds
+
+
+def test_while_one_program_runs_the_other_stands_still(bench, tmp_path):
+    turns = bench("turns")
+    tell = "import os, time\nfor _ in range(30): "
+    tell += "os.write(os.open({file!r}, os.O_WRONLY | os.O_APPEND | os.O_CREAT), b'{name}'); "
+    tell += "time.sleep(0.02)"
+    file = tmp_path / "told"
+    programs = [turns.Program([script(tell.format(file=str(file), name=n))]) for n in "ab"]
+    turns.take_turns(programs, 0.2)
+    told = file.read_text()
+    assert sorted(told) == ["a"] * 30 + ["b"] * 30
+    # Side by side they would alternate with every letter.
+    assert sum(x != y for x, y in itertools.pairwise(told)) < 20
+
+
+def test_program_that_fails_is_told_and_none_is_left(bench):
+    turns = bench("turns")
+    fails = turns.Program([script("raise SystemExit('no luck')")])
+    waits = turns.Program([script("import time; time.sleep(60)")] * 2)
+    with pytest.raises(SystemExit, match="ended with 1: no luck"):
+        turns.take_turns([waits, fails], 0.3)
+    assert [process.returncode for process in waits.processes] == [-9, -9]

@@ -1,0 +1,123 @@
+"""Programs that are measured by turns: while one runs, the others stand still.
+
+A machine that changes its speed within seconds, as virtual ones do, changes it for all of them.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import IO
+
+
+class Program:
+    """Processes that run and stand still together.
+
+    Parameters
+    ----------
+    commands : sequence of command lines
+    share : float
+        Length of its turns, in units of what `take_turns` is given.
+    prepares : bool
+        Whether each process says a line when it is ready, and begins when it is told one; what it
+        does before is not measured.
+    """
+
+    def __init__(
+        self, commands: Sequence[list[str]], share: float = 1.0, prepares: bool = False
+    ) -> None:
+        self.commands, self.share, self.prepares = commands, share, prepares
+        self.processes: list[subprocess.Popen[str]] = []
+        self.seconds = 0.0
+        """How long it has run."""
+        self._begun = False
+
+    def prepare(self) -> None:
+        """Have it get ready, alone on the machine."""
+        if self.prepares:
+            self._start()
+            for process in self.processes:
+                _stream(process.stdout).readline()
+
+    def run(self, seconds: float) -> bool:
+        """Let it run so long, and return whether it has ended; raise SystemExit where it failed."""
+        began = time.perf_counter()
+        if self._begun:
+            os.killpg(self._group(), signal.SIGCONT)
+        else:
+            self._begin()
+        ended = self._wait(began + seconds)
+        if not ended:
+            os.killpg(self._group(), signal.SIGSTOP)
+        self.seconds += time.perf_counter() - began
+        return ended
+
+    def kill(self) -> None:
+        """End all of it, standing or running."""
+        if self.processes:
+            with suppress(ProcessLookupError):
+                os.killpg(self._group(), signal.SIGKILL)
+        for process in self.processes:
+            process.wait()
+            for stream in (process.stdin, process.stdout, process.stderr):
+                if stream is not None:
+                    stream.close()
+
+    def _begin(self) -> None:
+        self._begun = True
+        if not self.prepares:
+            self._start()
+            return
+        for process in self.processes:
+            stream = _stream(process.stdin)
+            stream.write("\n")
+            stream.flush()
+
+    def _start(self) -> None:
+        for command in self.commands:
+            # All in the group of the first one, which others cannot have left before.
+            group = self._group() if self.processes else 0
+            pipe, none = subprocess.PIPE, subprocess.DEVNULL
+            output = pipe if self.prepares else none
+            self.processes.append(
+                subprocess.Popen(
+                    *(command,), stdin=pipe, stdout=output, stderr=pipe, text=True,
+                    process_group=group,
+                )
+            )  # fmt: skip
+
+    def _group(self) -> int:
+        return self.processes[0].pid
+
+    def _wait(self, until: float) -> bool:
+        for process in self.processes:
+            try:
+                status = process.wait(max(0.0, until - time.perf_counter()))
+            except subprocess.TimeoutExpired:
+                return False
+            if status:
+                words, said = " ".join(process.args), _stream(process.stderr).read()
+                raise SystemExit(f"{words} ended with {status}: {said}")
+        return True
+
+
+def take_turns(programs: Sequence[Program], turn: float) -> None:
+    """Let programs run by turns of so many seconds, each times its share, until all have ended."""
+    try:
+        for program in programs:
+            program.prepare()
+        left = list(programs)
+        while left:
+            left = [program for program in left if not program.run(turn * program.share)]
+    finally:
+        for program in programs:
+            program.kill()
+
+
+def _stream(stream: IO[str] | None) -> IO[str]:
+    assert stream is not None
+    return stream
