@@ -23,8 +23,14 @@ _WORKING, _LOCAL = ("run", "retry"), "local"
 _INTERRUPTED = 130
 
 
-def parser(program: str = "python -m chimera_hpc.sweep") -> ArgumentParser:
-    """Return the parser of the whole command line, called by this name."""
+def parser(
+    program: str = "python -m chimera_hpc.sweep", typed: Sequence[str] | None = None
+) -> ArgumentParser:
+    """Return the parser of the whole command line, called by this name.
+
+    It knows the arguments of all commands, or where `typed` is given only of those that are named
+    in it: the others need not be loaded then.
+    """
     from chimera_hpc.commands import COMMANDS
 
     top = ArgumentParser(
@@ -36,15 +42,13 @@ def parser(program: str = "python -m chimera_hpc.sweep") -> ArgumentParser:
     top.add_argument("--version", action="version", version=f"chimera_hpc {__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for command in COMMANDS:
-        sub = commands.add_parser(
-            command.NAME,
-            help=command.HELP,
-            description=command.HELP[0].upper() + command.HELP[1:] + ".",
-            epilog=command.EPILOG + "\n" + _EXITS,
-            formatter_class=RawDescriptionHelpFormatter,
-        )
-        command.add_arguments(sub)
-        sub.set_defaults(execute=command.execute)
+        sub = commands.add_parser(command.name, help=command.help)
+        if typed is None or command.name in typed:
+            sub.description = command.help[0].upper() + command.help[1:] + "."
+            sub.epilog = command.module.EPILOG + "\n" + _EXITS
+            sub.formatter_class = RawDescriptionHelpFormatter
+            command.module.add_arguments(sub)
+            sub.set_defaults(execute=command.module.execute)
     return top
 
 
@@ -77,7 +81,7 @@ def needs_workers(typed: Sequence[str]) -> bool:
 def _execute(typed: list[str]) -> int:
     from chimera_hpc.commands.exits import Exit
 
-    args = parser().parse_args(typed)
+    args = parser(typed=typed).parse_args(typed)
     args.typed = typed
     args.parser_named = parser
     try:

@@ -118,7 +118,7 @@ def command_line() -> str:
         top = parser()
         parts = [_text(top.format_help())]
         for command in COMMANDS:
-            parts += [f"## {command.NAME}", _text(_sub(top, command.NAME).format_help())]
+            parts += [f"## {command.name}", _text(_sub(top, command.name).format_help())]
     finally:
         del os.environ["COLUMNS"]
         if before is not None:

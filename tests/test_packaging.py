@@ -107,6 +107,17 @@ def test_unknown_name_is_an_attribute_error():
         _ = chimera_hpc.nothing_like_this
 
 
+@pytest.mark.parametrize(
+    ("typed", "loaded"), [(["--help"], []), (["schema"], ["schema"]), (None, ["run", "schema"])]
+)
+def test_only_the_command_that_is_typed_is_loaded(typed, loaded):
+    code = f"import sys; from chimera_hpc.sweep import parser; parser(typed={typed})\n"
+    code += "print(*[name for name in sys.modules if name.startswith('chimera_hpc.commands.')])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    names = {name.removeprefix("chimera_hpc.commands.") for name in done.stdout.split()}
+    assert {"run", "schema"} & names == set(loaded)
+
+
 def test_simulate_stays_the_function_after_its_module_was_imported():
     code = (
         "import chimera_hpc.simulate\n"

@@ -11,8 +11,6 @@ from chimera_hpc.slurm import queue, tls
 from chimera_hpc.slurm.queue import SlurmFailed
 from chimera_hpc.slurm.script import job_name
 
-NAME = "cancel"
-HELP = "cancel a sweep's SLURM jobs, and what a killed driver left behind"
 EPILOG = """examples:
   python -m chimera_hpc.sweep cancel results/quickstart
 

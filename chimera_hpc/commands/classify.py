@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from chimera_hpc.recordings.judge import Judge, Measured
     from chimera_hpc.recordings.prepare import Prepared
 
-NAME = "classify"
-HELP = "measure a recording of your own, and classify it by the classes of a sweep"
 EPILOG = """examples:
   python -m chimera_hpc.sweep classify recording.csv
   python -m chimera_hpc.sweep classify recording.npz --atlas results/quickstart

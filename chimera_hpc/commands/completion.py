@@ -10,8 +10,6 @@ from chimera_hpc.commands.exits import Exit
 from chimera_hpc.errors import BadInput
 from chimera_hpc.shipped import job_file
 
-NAME = "completion"
-HELP = "print what lets a shell complete the command chimera-hpc"
 EPILOG = """examples:
   chimera-hpc completion bash > ~/.local/share/bash-completion/completions/chimera-hpc
   chimera-hpc completion zsh > ~/.zfunc/_chimera-hpc       (with fpath+=~/.zfunc before compinit)

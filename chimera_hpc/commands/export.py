@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from chimera_hpc.store import Store
 
-NAME = "export"
-HELP = "write results as NetCDF, as a CSV table of the triplets, or all that matters as a zip"
 EPILOG = """examples:
   python -m chimera_hpc.sweep export results/quickstart --to quickstart.csv
   python -m chimera_hpc.sweep export results/quickstart --to quickstart.nc

@@ -16,8 +16,6 @@ from chimera_hpc.commands.estimate import estimate, refuse_absurd
 from chimera_hpc.commands.exits import Exit
 from chimera_hpc.errors import BadInput
 
-NAME = "extend"
-HELP = "add points to a sweep: more seeds, new values on any axis; computes nothing"
 EPILOG = """examples:
   python -m chimera_hpc.sweep extend jobs/quickstart.toml --set seeds=40
   python -m chimera_hpc.sweep extend jobs/quickstart.toml --set P=2:30 --out results/quickstart

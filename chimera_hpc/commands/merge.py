@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from chimera_hpc.store import Store
     from chimera_hpc.store.merging import Merged
 
-NAME = "merge"
-HELP = "make one sweep of several that differ in their axes only"
 EPILOG = """examples:
   python -m chimera_hpc.sweep merge results/seeds-0-19 results/seeds-20-39 --out results/all
 

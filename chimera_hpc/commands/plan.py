@@ -15,8 +15,6 @@ from chimera_hpc.commands.arguments import (
 from chimera_hpc.commands.estimate import estimate, in_bytes, in_time, refuse_absurd
 from chimera_hpc.commands.exits import Exit
 
-NAME = "plan"
-HELP = "say what a sweep would cost: points, blocks, files, bytes, core-hours; starts nothing"
 EPILOG = """examples:
   python -m chimera_hpc.sweep plan jobs/quickstart.toml
   python -m chimera_hpc.sweep plan jobs/quickstart.toml --set seeds=100 --set keep.series=none

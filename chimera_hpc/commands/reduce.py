@@ -11,8 +11,6 @@ from chimera_hpc.errors import BadInput
 from chimera_hpc.ledger import read_ledger
 from chimera_hpc.status import Status
 
-NAME = "reduce"
-HELP = "make results.json, figures and the report from what is in the store"
 EPILOG = """examples:
   python -m chimera_hpc.sweep reduce results/quickstart
 """

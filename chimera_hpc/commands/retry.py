@@ -27,8 +27,6 @@ from chimera_hpc.status import Status
 if TYPE_CHECKING:
     from chimera_hpc.store import Store
 
-NAME = "retry"
-HELP = "compute failed points once more, and reduce"
 EPILOG = """examples:
   python -m chimera_hpc.sweep retry results/quickstart
   python -m chimera_hpc.sweep retry results/quickstart --status time_out --time-out 7200

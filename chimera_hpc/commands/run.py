@@ -32,8 +32,6 @@ from chimera_hpc.grid import Sweep
 if TYPE_CHECKING:
     from chimera_hpc.store import Store
 
-NAME = "run"
-HELP = "run a sweep, or go on with one, and reduce it"
 EPILOG = """examples:
   python -m chimera_hpc.sweep run jobs/quickstart.toml
   python -m chimera_hpc.sweep run jobs/quickstart.toml --workers 4 --out /scratch/me/quick

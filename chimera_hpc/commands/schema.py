@@ -7,8 +7,6 @@ from argparse import ArgumentParser, Namespace
 from chimera_hpc.commands.exits import Exit
 from chimera_hpc.grid.schema import schema_text
 
-NAME = "schema"
-HELP = "print the JSON Schema of the job file, with which editors check and complete one"
 EPILOG = """examples:
   python -m chimera_hpc.sweep schema > job.schema.json
 

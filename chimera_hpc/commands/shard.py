@@ -28,8 +28,6 @@ from chimera_hpc.ledger import FAILED
 if TYPE_CHECKING:
     from chimera_hpc.store import Store
 
-NAME = "shard"
-HELP = "compute one share of a sweep's blocks, straight into its store"
 EPILOG = """examples:
   python -m chimera_hpc.sweep shard results/quickstart --of 16              in a job array
   python -m chimera_hpc.sweep shard results/quickstart --of 16 --index 3

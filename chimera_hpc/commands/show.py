@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from chimera_hpc.replay import Replay
     from chimera_hpc.store import Store
 
-NAME = "show"
-HELP = "compute a point or a cell anew and draw it: space-time plot, profiles, portrait, spectrum"
 EPILOG = """examples:
   python -m chimera_hpc.sweep show results/quickstart P=12 Q=12 seed=3
   python -m chimera_hpc.sweep show results/quickstart P=12 --node 20 --window 2

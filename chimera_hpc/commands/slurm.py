@@ -30,8 +30,6 @@ from chimera_hpc.slurm.script import ARRAY, LOGS, MODES, SCRIPTS, TIME, Target, 
 if TYPE_CHECKING:
     from chimera_hpc.grid import Sweep
 
-NAME = "slurm"
-HELP = "print the batch script of a sweep for SLURM, or submit it"
 EPILOG = """examples:
   python -m chimera_hpc.sweep slurm jobs/quickstart.toml --mode array
   python -m chimera_hpc.sweep slurm jobs/quickstart.toml --mode array --array 16 --submit

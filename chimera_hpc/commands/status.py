@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-NAME = "status"
-HELP = "say what is done, from the store alone, while a sweep runs or after"
 EPILOG = """examples:
   python -m chimera_hpc.sweep status results/quickstart
   python -m chimera_hpc.sweep status results/quickstart --json

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from chimera_hpc.grid import Points
     from chimera_hpc.store import Damage, Store
 
-NAME = "verify"
-HELP = "decode what is stored, and compute a sample of the points anew"
 EPILOG = """examples:
   python -m chimera_hpc.sweep verify results/quickstart --stored
   python -m chimera_hpc.sweep verify results/quickstart --stored --forget

@@ -16,8 +16,6 @@ from chimera_hpc.ledger import LedgerScan, read_metadata, scan_ledger
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-NAME = "watch"
-HELP = "show the state of a sweep in the terminal until it is done"
 EPILOG = """examples:
   python -m chimera_hpc.sweep watch results/quickstart
   python -m chimera_hpc.sweep watch /scratch/me/plane --every 10

@@ -16,8 +16,6 @@ from chimera_hpc.status import Status
 if TYPE_CHECKING:
     from chimera_hpc.store import Store
 
-NAME = "why"
-HELP = "explain what became of one point: status, tries, who computed it, with what"
 EPILOG = """examples:
   python -m chimera_hpc.sweep why results/quickstart P=3 Q=3 seed=7
 """

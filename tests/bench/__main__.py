@@ -33,6 +33,7 @@ PARTS = (
     "networked",
     "precision",
     "sweeps",
+    "starting",
     "reduction",
     "projection",
 )
@@ -76,8 +77,9 @@ def _part(part: str, sizes: Sizes, folder: Path, results: Results, tiny: bool) -
         settings = ["P=3:4", "seeds=1", "integrator.t_end=20", "features.start=10"] if tiny else []
         seeds = (1,) if tiny else (1, 5)
         rows = sweeps.workers(folder, settings, seeds, results.scaling)
-        rows += sweeps.memory((55.0, 60.0) if tiny else (1000.0, 10_000.0))
-        return rows + sweeps.starting(folder, 1 if tiny else 3)
+        return rows + sweeps.memory((55.0, 60.0) if tiny else (1000.0, 10_000.0))
+    if part == "starting":
+        return sweeps.starting(folder, 1 if tiny else 3)
     if part == "reduction":
         return _reduction(folder, results, tiny)
     return _projection(folder, results, tiny)

@@ -9,53 +9,62 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.provenance import cpu_model
 
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "jax", "diffrax", "dask", "zarr")
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Wall times of one thing, seconds."""
-
-    seconds: tuple[float, ...]
-
-    @property
-    def median(self) -> float:
-        return statistics.median(self.seconds)
-
-    @property
-    def spread(self) -> float:
-        """Half the range, over the median."""
-        return (max(self.seconds) - min(self.seconds)) / 2 / self.median
+Seconds = tuple[float, ...]
+"""Wall times of one thing, one a round."""
 
 
 def interleaved(
     contenders: Mapping[str, Callable[[], object]], repeats: int, at_least: float = 0.0
-) -> dict[str, Timing]:
-    """Time each contender once a round, so that a busy moment of the machine meets all of them.
+) -> dict[str, Seconds]:
+    """Time each contender in each round, so that a busy moment of the machine meets all of them.
 
-    In its turn a contender is called again until `at_least` seconds have gone by, and their mean
-    counts: a machine that changes its speed within seconds meets short and long ones alike. Each
-    has run once before, unmeasured: compilation is measured elsewhere.
+    In a round they are called one after the other, again and again, until each has run for
+    `at_least` seconds, and its mean counts: a machine that changes its speed within seconds meets
+    short and long ones alike. Each has run once before, unmeasured: compilation is measured
+    elsewhere.
     """
     for run in contenders.values():
         run()
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    for _ in range(repeats):
-        for name, run in contenders.items():
-            began, calls, elapsed = time.perf_counter(), 0, -1.0
-            while elapsed < at_least:
-                run()
-                calls += 1
-                elapsed = time.perf_counter() - began
-            times[name].append(elapsed / calls)
-    return {name: Timing(tuple(seconds)) for name, seconds in times.items()}
+    rounds = [_round(contenders, at_least) for _ in range(repeats)]
+    return {name: tuple(means[name] for means in rounds) for name in contenders}
+
+
+def _round(contenders: Mapping[str, Callable[[], object]], at_least: float) -> dict[str, float]:
+    spent: dict[str, list[float]] = {name: [] for name in contenders}
+    left = list(contenders)
+    while left:
+        for name in left:
+            began = time.perf_counter()
+            contenders[name]()
+            spent[name].append(time.perf_counter() - began)
+        left = [name for name in left if sum(spent[name]) < at_least]
+    return {name: statistics.mean(seconds) for name, seconds in spent.items()}
+
+
+def typical(spent: NDArray[np.float64]) -> list[float]:
+    """Return the medians over rounds of what contenders (n, rounds) take.
+
+    The medians are those of their shares of a round, times that of a round: a machine that is
+    slower in some rounds than in others changes no ratio.
+    """
+    rounds = spent.sum(axis=0)
+    found: list[float] = (np.median(spent / rounds, axis=1) * np.median(rounds)).tolist()
+    return found
+
+
+def medians(times: Mapping[str, Seconds]) -> dict[str, float]:
+    """Return what each contender takes, as `typical` finds it."""
+    return dict(zip(times, typical(np.array(list(times.values()))), strict=True))
 
 
 def stay_on_one_core() -> None:
@@ -68,7 +77,7 @@ def multiplication_rate(n: int = 1024, repeats: int = 60) -> float:
     rng = np.random.default_rng(0)
     a, b, c = rng.random((n, n)), rng.random((n, n)), np.empty((n, n))
     timing = interleaved({"dgemm": lambda: np.matmul(a, b, out=c)}, repeats)["dgemm"]
-    return 2.0 * n**3 / min(timing.seconds)
+    return 2.0 * n**3 / min(timing)
 
 
 def second_cache() -> int:

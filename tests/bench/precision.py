@@ -7,7 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 import peers
-from measure import interleaved
+from measure import interleaved, medians
 from numpy.typing import NDArray
 from problems import Ring, error
 
@@ -45,10 +45,10 @@ def curves(tolerances: tuple[float, ...], repeats: int, with_jax: bool) -> dict[
     found: dict[str, Curve] = {name: [] for name in runs}
     for rtol in tolerances:
         bound = {name: partial(run, rtol) for name, run in runs.items()}
-        times = interleaved(bound, repeats)
+        times = medians(interleaved(bound, repeats))
         for name, run in bound.items():
             share = SEEDS if "lanes" in name else 1
-            found[name].append((error(run(), reference), times[name].median / share))
+            found[name].append((error(run(), reference), times[name] / share))
     return found
 
 

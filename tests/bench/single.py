@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import peers
-from measure import Timing, interleaved, multiplication_rate, second_cache
+from measure import interleaved, medians, multiplication_rate, second_cache, typical
 from numpy.typing import NDArray
 from problems import Ring, error
 from scipy.integrate import solve_ivp
@@ -149,9 +149,8 @@ def _on_ring(ring: Ring, sizes: Sizes) -> list[Row]:
     for rtol in {RTOL, *limits.values()}:
         runs[f"ours at {rtol:g}"] = partial(one, ring, 0, rtol)
         runs[f"lanes at {rtol:g}"] = partial(many, ring, SEEDS, rtol)
-    return _compare(
-        ring.half_degree, interleaved(runs, sizes.repeats, sizes.at_least), errors, limits
-    )
+    times = medians(interleaved(runs, sizes.repeats, sizes.at_least))
+    return _compare(ring.half_degree, times, errors, limits)
 
 
 def _first(solver: Callable[[Array], Array], states: Array) -> Callable[[], Array]:
@@ -170,25 +169,25 @@ _TARGETS = {
 
 
 def _compare(
-    half_degree: int, times: dict[str, Timing], errors: dict[str, float], limits: dict[str, float]
+    half_degree: int, times: dict[str, float], errors: dict[str, float], limits: dict[str, float]
 ) -> list[Row]:
     rows = []
     for name, (latency, throughput) in _TARGETS.items():
         if name not in times:
             continue
-        rtol, alone = limits[name], times[name].median
+        rtol, alone = limits[name], times[name]
         note = f"{alone:.3g} s and error {errors[name]:.1e}; ours {{:.3g}} s at rtol {rtol:g}"
         note += f"; at rtol {RTOL:g} (error {errors['ours']:.1e}) {{:.3g}} times"
         if latency is not None:
-            equal = times[f"ours at {rtol:g}"].median
-            same = alone / times[f"ours at {RTOL:g}"].median
+            equal = times[f"ours at {rtol:g}"]
+            same = alone / times[f"ours at {RTOL:g}"]
             what = f"one trajectory, P = {half_degree}, against {name}"
             text = note.format(equal, same)
             rows.append(Row(what, alone / equal, "times", latency, True, text))
         together = times.get(f"{name}, together")
-        best = min(alone, together.median / SEEDS) if together else alone
-        equal = times[f"lanes at {rtol:g}"].median / SEEDS
-        same = best / (times[f"lanes at {RTOL:g}"].median / SEEDS)
+        best = min(alone, together / SEEDS) if together else alone
+        equal = times[f"lanes at {rtol:g}"] / SEEDS
+        same = best / (times[f"lanes at {RTOL:g}"] / SEEDS)
         what = f"{SEEDS} trajectories, P = {half_degree}, against {name}"
         text = note.replace(f"{alone:.3g} s", f"{best:.3g} s a trajectory", 1).format(equal, same)
         rows.append(Row(what, best / equal, "times", throughput, True, text))
@@ -228,24 +227,13 @@ def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[Lane
         runs[name] = partial(run, name, model, states, steps + steps // 2)
     times = interleaved(runs, repeats)
     spent = [
-        np.subtract(times[name].seconds, times[f"{name} short"].seconds) / (8 * steps)
+        np.subtract(times[name], times[f"{name} short"]) / (8 * steps)
         for name, (_, _, steps) in zip(names, rings, strict=True)
     ]
     return [
         LaneStep(seconds, accepted[name])
         for name, seconds in zip(names, typical(np.array(spent)), strict=True)
     ]
-
-
-def typical(spent: Array) -> list[float]:
-    """Return the medians over rounds of what contenders (n, rounds) take.
-
-    The medians are those of their shares of a round, times that of a round: a machine that is
-    slower in some rounds than in others changes no ratio.
-    """
-    rounds = spent.sum(axis=0)
-    found: list[float] = (np.median(spent / rounds, axis=1) * np.median(rounds)).tolist()
-    return found
 
 
 def nodes_in_second_cache() -> int:
@@ -381,16 +369,14 @@ def networked(sizes: Sizes) -> list[Row]:
         if error(ours(looser), reference) > limit:
             break
         rtol = looser
-    found = interleaved(
-        {"SciPy": rival, "one": lambda: ours(rtol), "lanes": lambda: lanes(rtol), "same": ours},
-        sizes.repeats,
-        sizes.at_least,
-    )
-    seconds = found["SciPy"].median
-    each = found["lanes"].median / SEEDS
+    runs: dict[str, Callable[[], object]] = {
+        "SciPy": rival, "one": lambda: ours(rtol), "lanes": lambda: lanes(rtol), "same": ours
+    }  # fmt: skip
+    found = medians(interleaved(runs, sizes.repeats, sizes.at_least))
+    seconds, each = found["SciPy"], found["lanes"] / SEEDS
     note = f"SciPy {seconds:.3g} s and error {limit:.1e}, ours {each:.3g} s at rtol {rtol:g}; one "
-    note += f"alone {seconds / found['one'].median:.3g} times, at rtol {RTOL:g} "
-    note += f"{seconds / found['same'].median:.3g} times"
+    note += f"alone {seconds / found['one']:.3g} times, at rtol {RTOL:g} "
+    note += f"{seconds / found['same']:.3g} times"
     return [
         Row("networked model, N0 = 500, P = 165, 16 trajectories, against SciPy RK45",
             seconds / each, "times", 20.0, True, note)

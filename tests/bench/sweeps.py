@@ -33,6 +33,10 @@ job, share, shares, *settings = sys.argv[1:]
 sweep = Sweep.load(job, settings)
 points = sweep.points()
 warm_up(sweep, points)
+if int(shares) > 1:
+    # Stopped and woken again and again, two may be put on one core.
+    cores = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, {cores[int(share) % len(cores)]})
 print("ready", flush=True)
 sys.stdin.readline()
 cuts = blocks(len(points), block_size(sweep, len(points)))

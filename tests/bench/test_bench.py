@@ -55,12 +55,12 @@ def test_peers_solve_the_same_problem(bench):
 
 def test_slow_rounds_change_no_ratio(bench):
     speed = np.array([1.0, 1.0, 1.7, 0.6, 1.7])
-    found = bench("single").typical(np.outer([2.0, 3.0, 6.0], speed))
+    found = bench("measure").typical(np.outer([2.0, 3.0, 6.0], speed))
     assert found == pytest.approx([2.0, 3.0, 6.0])
     # One contender alone disturbed in one round: no more than its median feels.
     spent = np.outer([2.0, 3.0, 6.0], np.ones(5))
     spent[1, 2] = 30.0
-    assert bench("single").typical(spent) == pytest.approx([2.0, 3.0, 6.0])
+    assert bench("measure").typical(spent) == pytest.approx([2.0, 3.0, 6.0])
 
 
 def test_a_projection_without_costs_is_ideal(bench):

@@ -16,7 +16,7 @@ def test_bash_accepts_the_script_and_completes_commands_and_choices(sweep, tmp_p
     assert code == 0
     (tmp_path / "script").write_text(script)
     typed = {
-        "chimera-hpc ": {command.NAME for command in COMMANDS},
+        "chimera-hpc ": {command.name for command in COMMANDS},
         "chimera-hpc run --clus": {"--cluster"},
         "chimera-hpc completion ": {"bash", "zsh"},
     }
