@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.errors import BadInput
 from chimera_hpc.fork_server import METHOD, ONE_THREAD, environment, is_running, quiet_tracker
+from chimera_hpc.processes import usable_cores
 
 if TYPE_CHECKING:
     from distributed import Client, Scheduler, SpecCluster
@@ -57,13 +58,6 @@ def settings(patience: float = 60.0) -> dict[str, Any]:
         "distributed.admin.tick.interval": "10s",
         "distributed.admin.tick.limit": "1h",
     }
-
-
-def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager

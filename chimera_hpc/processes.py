@@ -1,4 +1,4 @@
-"""A mark of this very process, by which others on the machine can tell that it is gone."""
+"""This process: a mark by which others on the machine can tell that it is gone, and its cores."""
 
 from __future__ import annotations
 
@@ -32,6 +32,13 @@ def is_gone(mark: str) -> bool:
         return False
     started = _started(int(pid))
     return started is None or started != int(start)
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @lru_cache(maxsize=1)

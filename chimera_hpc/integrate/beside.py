@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -10,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from chimera_hpc.integrate._jit import cache_folder, source_digest
+from chimera_hpc.processes import usable_cores
 
 _COMPILE = """
 import sys
@@ -44,13 +44,7 @@ def _is_worth_it() -> bool:
     folder = Path(cache_folder())
     # A folder for this process alone, where no other can be written, is of no use to two.
     shared = folder.name == source_digest()
-    return shared and _cores() > 1 and not any(folder.glob("*/kernel._advance_pack-*.nbc"))
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return shared and usable_cores() > 1 and not any(folder.glob("*/kernel._advance_pack-*.nbc"))
 
 
 def _start() -> subprocess.Popen[bytes]:

@@ -85,10 +85,9 @@ class Program:
             output = pipe if self.prepares else none
             self.processes.append(
                 subprocess.Popen(
-                    *(command,), stdin=pipe, stdout=output, stderr=pipe, text=True,
-                    process_group=group,
+                    command, stdin=pipe, stdout=output, stderr=pipe, text=True, process_group=group
                 )
-            )  # fmt: skip
+            )
 
     def _group(self) -> int:
         return self.processes[0].pid

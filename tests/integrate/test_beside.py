@@ -14,6 +14,7 @@ import pytest
 from chimera_hpc.integrate import beside
 from chimera_hpc.integrate._jit import source_digest
 from chimera_hpc.integrate.beside import stepping_loops_beside
+from chimera_hpc.processes import usable_cores
 
 _WARM_UP = """
 import json, sys
@@ -38,7 +39,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / source_digest()
     folder.mkdir()
     monkeypatch.setattr(beside, "cache_folder", lambda: str(folder))
-    monkeypatch.setattr(beside, "_cores", lambda: 2)
+    monkeypatch.setattr(beside, "usable_cores", lambda: 2)
     return folder
 
 
@@ -86,7 +87,7 @@ def test_no_process_beside_where_it_is_of_no_use(
         (folder / "integrate_0").mkdir()
         (folder / "integrate_0" / "kernel._advance_pack-1.py311.1.nbc").touch()
     elif reason == "one core":
-        monkeypatch.setattr(beside, "_cores", lambda: 1)
+        monkeypatch.setattr(beside, "usable_cores", lambda: 1)
     else:
         monkeypatch.setattr(beside, "cache_folder", lambda: str(folder.parent))
     with stepping_loops_beside():
@@ -94,7 +95,7 @@ def test_no_process_beside_where_it_is_of_no_use(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(beside._cores() < 2, reason="needs two cores")
+@pytest.mark.skipif(usable_cores() < 2, reason="needs two cores")
 def test_first_warm_up_compiles_no_stepping_loop_itself(tmp_path: Path) -> None:
     paths = os.pathsep.join(filter(None, sys.path))
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": paths}
