@@ -150,8 +150,8 @@ _HEAD = """# Measured performance
 
 measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
 interleaved turns, of at least a second for each contender where peers are in the row. Whole
-commands and bare blocks run by turns of a tenth of a second, one standing still while the other
-runs, each charged with its own turns. One core unless workers are named.
+commands, bare blocks and dgemm run by turns of a tenth of a second, one standing still while
+another runs, each charged with its own turns. One core unless workers are named.
 Machine: {machine}; load average at the
 start {load:.1f}."""
 
@@ -167,7 +167,10 @@ What limits it:
 * Starting Python, the cluster and its workers, planning and the reduction take a few seconds
   whatever the number of points, and at the end one worker waits for the other's last block.
 * A virtual machine may change its speed by half within seconds: medians of five turns change with
-  it, and such rows fall to either side of a target that is near from one call to the next."""
+  it, and such rows fall to either side of a target that is near from one call to the next.
+* Its cores may be threads of cores that other machines use too. Then two processes do not do twice
+  the work of one, whatever they do: what dgemm gains from the second core is measured at the same
+  moments as what the blocks gain, and 2 workers over 1 is shown as it is and as a part of that."""
 
 _ERRORS = """\
 *Error* is the largest difference of u from a DOP853 solution at rtol 1e-13, up to t = 20

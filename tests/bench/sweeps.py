@@ -8,12 +8,14 @@ import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import bare
 import psutil
 from programs import SCALE, load_program
 from single import Row, Scaling
@@ -23,27 +25,6 @@ ROOT = Path(__file__).parents[2]
 PLANE = ROOT / "jobs" / "paper" / "plane.toml"
 MB = 1e6
 _SWEEP = (sys.executable, "-P", "-m", "chimera_hpc.sweep")
-_BARE = """
-import os, sys
-from chimera_hpc.grid import Sweep
-from chimera_hpc.grid.blocks import block_size, blocks
-from chimera_hpc.task import run_block, warm_up
-
-job, share, shares, *settings = sys.argv[1:]
-sweep = Sweep.load(job, settings)
-points = sweep.points()
-warm_up(sweep, points)
-if int(shares) > 1:
-    # Stopped and woken again and again, two may be put on one core.
-    cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, {cores[int(share) % len(cores)]})
-print("ready", flush=True)
-sys.stdin.readline()
-cuts = blocks(len(points), block_size(sweep, len(points)))
-for start, stop in cuts[int(share) :: int(shares)]:
-    run_block(sweep, points[slice(start, stop)])
-os._exit(0)
-"""
 _TURN = 0.1
 """Seconds that a program runs before it is the other one's turn: a virtual machine may change its
 speed within a second."""
@@ -86,7 +67,7 @@ def watched(
 
 
 def workers(
-    folder: Path, settings: list[str], seeds: tuple[int, ...], scaling: Scaling
+    folder: Path, settings: list[str], seeds: tuple[int, ...], products: int, scaling: Scaling
 ) -> list[Row]:
     """The plane with one worker and with two, and its blocks without executor and store."""
     options = [word for setting in settings for word in ("--set", setting)]
@@ -98,30 +79,54 @@ def workers(
         seconds = watched(command).seconds
         if k > 0:
             scaling.points.append((_points(out), seconds))
+    blocks = [str(PLANE), *settings]
     whole = {n: _whole(run, folder, n) for n in (1, 2)}
-    cost = {n: _over(whole[n], _bare_blocks(n, settings)) - 1.0 for n in (2, 1)}
-    alone = {n: _bare_blocks(n, settings) for n in (1, 2)}
-    # Only those of a pair are compared, for the machine may change from pair to pair. One process
-    # gets longer turns, so that both of its pair end at about the same time.
-    alone[1].share = 2.0
-    limit = _over(alone[1], alone[2])
-    gain = limit * (1.0 + cost[1]) / (1.0 + cost[2])
+    cost = {}
+    for n in (2, 1):
+        alone = bare.program("blocks", n, blocks, folder)
+        take_turns([whole[n], alone], _TURN)
+        cost[n] = whole[n].seconds / alone.seconds - 1.0
+    rows, gain = _two_processes(folder, blocks, products, cost)
     full = watched([*run, "--out", str(folder / "plane"), "--workers", "2"])
-    note = f"{limit:.2f} times without executor and store, each process every second block "
-    note += f"({alone[1].seconds:.1f} s and {alone[2].seconds:.1f} s); with them, see the next row"
-    both = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%} ({whole[2].seconds:.1f} s): "
-    both += "start, planning, reduction included"
+    note = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%} ({whole[2].seconds:.1f} s): "
+    note += "start, planning, reduction included"
     size = _points(folder / "plane")
     # As if both had met the machine that the one with two workers met.
     scaling.workers = [(1, gain * whole[2].seconds), (2, whole[2].seconds)]
     scaling.points.append((size, whole[2].seconds))
     return [
-        Row("2 workers over 1, whole command", gain, "times", 1.9, True, note),
-        Row("whole command over bare blocks, minus one", max(cost.values()), "", 0.05, False, both),
+        *rows,
+        Row("whole command over bare blocks, minus one", max(cost.values()), "", 0.05, False, note),
         Row("largest worker process", full.peak / MB, "MB", 320.0, False),
         Row(f"the {size}-point plane, 2 workers, figures included", full.seconds / 60, "minutes",
             6.0, False),
     ]  # fmt: skip
+
+
+def _two_processes(
+    folder: Path, blocks: list[str], products: int, cost: dict[int, float]
+) -> tuple[list[Row], float]:
+    """What a second worker gains, and what the machine's second core gives."""
+    pairs = {}
+    # What lasts longer gets longer turns, so that all end at about the same time. Only those that
+    # have taken turns are compared, for the machine changes.
+    for kind, words, share in (("blocks", blocks, 1.0), ("dgemm", [str(products)], 0.5)):
+        pairs[kind] = [bare.program(kind, n, words, folder) for n in (1, 2)]
+        pairs[kind][0].share, pairs[kind][1].share = 2.0 * share, share
+    take_turns([program for pair in pairs.values() for program in pair], _TURN)
+    limit, given = (one.seconds / two.seconds for one, two in pairs.values())
+    gain = limit * (1.0 + cost[1]) / (1.0 + cost[2])
+    one, two = (program.seconds for program in pairs["blocks"])
+    note = (
+        f"{limit:.2f} times without executor and store ({one:.1f} s and {two:.1f} s); with them, "
+    )
+    note += "see the overhead below"
+    machine = f"dgemm in two processes over one: {given:.2f} times, by turns with the bare blocks"
+    return [
+        Row("2 workers over 1, whole command", gain, "times", 1.9, True, note),
+        Row("the same, of what two cores of this machine give", gain / given, "", 0.95, True,
+            machine),
+    ], gain  # fmt: skip
 
 
 def _whole(run: list[str], folder: Path, n: int) -> Program:
@@ -129,33 +134,20 @@ def _whole(run: list[str], folder: Path, n: int) -> Program:
     return Program([[*run, *out]])
 
 
-def _bare_blocks(n: int, settings: list[str]) -> Program:
-    """The blocks in n processes, and nothing else."""
-    return Program([_bare(PLANE, k, n, settings) for k in range(n)], prepares=True)
-
-
-def _over(first: Program, second: Program) -> float:
-    """Seconds of a program over those of another one, measured by turns."""
-    take_turns([first, second], _TURN)
-    return first.seconds / second.seconds
-
-
-def _bare(job: Path, share: int, shares: int, settings: list[str]) -> list[str]:
-    return [sys.executable, "-P", "-c", _BARE, str(job), str(share), str(shares), *settings]
-
-
 def _points(out: Path) -> int:
     total: int = json.loads((out / "results.json").read_text())["points"]["total"]
     return total
 
 
-def memory(t_ends: tuple[float, float]) -> list[Row]:
+def memory(folder: Path, t_ends: tuple[float, float]) -> list[Row]:
     """Growth of a process that integrates ten times as long."""
     peak_memory = load_program(SCALE, "scale_measurements").peak_memory
     peaks = []
     for t_end in t_ends:
         settings = ["P=12", "seeds=8", f"integrator.t_end={t_end}", f"features.start={t_end - 50}"]
-        command = _bare(ROOT / "jobs" / "quickstart.toml", 0, 1, settings)
+        words = [str(ROOT / "jobs" / "quickstart.toml"), *settings]
+        claims = tempfile.mkdtemp(prefix="claims-", dir=folder)
+        command = bare.command("blocks", claims, "any", words)
         none = subprocess.DEVNULL
         process = subprocess.Popen(command, stdin=none, stdout=none)
         peak = 0
@@ -199,8 +191,6 @@ def starting(folder: Path, repeats: int) -> list[Row]:
 @contextmanager
 def scratch(parent: Path | None) -> Iterator[Path]:
     """Give a folder that is removed in the end."""
-    import tempfile
-
     folder = Path(tempfile.mkdtemp(prefix="chimera-bench-", dir=parent))
     try:
         yield folder

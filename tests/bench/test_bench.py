@@ -34,7 +34,7 @@ def test_every_part_runs_and_leaves_a_page(tmp_path):
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     rows = json.loads(out.read_text())
-    assert len(rows) == 17
+    assert len(rows) == 18
     assert all(np.isfinite(row["value"]) for row in rows)
     assert "10 million points" in (tmp_path / "performance.md").read_text()
     for name in ("performance", "scaling"):
@@ -61,6 +61,13 @@ def test_slow_rounds_change_no_ratio(bench):
     spent = np.outer([2.0, 3.0, 6.0], np.ones(5))
     spent[1, 2] = 30.0
     assert bench("measure").typical(spent) == pytest.approx([2.0, 3.0, 6.0])
+
+
+def test_bare_processes_share_the_pieces(bench, tmp_path):
+    bare = bench("bare")
+    one, other = bare._left(str(tmp_path), "abcde"), bare._left(str(tmp_path), "abcde")
+    assert [next(one), next(other), next(other), *one] == list("abcde")
+    assert list(other) == []
 
 
 def test_a_projection_without_costs_is_ideal(bench):
