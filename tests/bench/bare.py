@@ -21,15 +21,13 @@ _PRODUCTS = 1000
 
 def program(kind: str, processes: int, words: Sequence[str], folder: Path) -> Program:
     """Return a program of so many processes, each of which takes the next piece that is left."""
-    # Stopped and woken again and again, two may be put on one core.
-    cores = ["any"] if processes == 1 else [str(k) for k in range(processes)]
+    return Program([command(kind, words, folder)] * processes, prepares=True)
+
+
+def command(kind: str, words: Sequence[str], folder: Path) -> list[str]:
+    """Return the command line of a process; it shares the work with others of this command line."""
     claims = tempfile.mkdtemp(prefix="claims-", dir=folder)
-    return Program([command(kind, claims, core, words) for core in cores], prepares=True)
-
-
-def command(kind: str, claims: str, core: str, words: Sequence[str]) -> list[str]:
-    """Return the command line of one process; `claims` is a folder that its program shares."""
-    return [sys.executable, __file__, kind, claims, core, *words]
+    return [sys.executable, __file__, kind, claims, *words]
 
 
 def _blocks(job: str, *settings: str) -> list[Callable[[], object]]:
@@ -71,11 +69,8 @@ def _left(claims: str, work: Sequence[Callable[[], object]]) -> Iterator[Callabl
 
 def main() -> None:
     """Prepare, say so, wait to be told a line, and do what no other process has taken."""
-    kind, claims, core, *words = sys.argv[1:]
+    kind, claims, *words = sys.argv[1:]
     work = _blocks(*words) if kind == "blocks" else _dgemm(*words)
-    if core != "any":
-        cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[int(core) % len(cores)]})
     print("ready", flush=True)
     sys.stdin.readline()
     for piece in _left(claims, work):

@@ -146,8 +146,7 @@ def memory(folder: Path, t_ends: tuple[float, float]) -> list[Row]:
     for t_end in t_ends:
         settings = ["P=12", "seeds=8", f"integrator.t_end={t_end}", f"features.start={t_end - 50}"]
         words = [str(ROOT / "jobs" / "quickstart.toml"), *settings]
-        claims = tempfile.mkdtemp(prefix="claims-", dir=folder)
-        command = bare.command("blocks", claims, "any", words)
+        command = bare.command("blocks", words, folder)
         none = subprocess.DEVNULL
         process = subprocess.Popen(command, stdin=none, stdout=none)
         peak = 0

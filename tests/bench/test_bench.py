@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 FOLDER = Path(__file__).parent
@@ -116,6 +117,30 @@ def test_while_one_program_runs_the_other_stands_still(bench, tmp_path):
     assert sorted(told) == ["a"] * 30 + ["b"] * 30
     # Side by side they would alternate with every letter.
     assert sum(x != y for x, y in itertools.pairwise(told)) < 20
+
+
+def test_processes_of_a_program_change_cores_and_share_none(bench):
+    turns = bench("turns")
+    cores = sorted(os.sched_getaffinity(0))
+    # The second one works in a process of its own, as the worker of a whole command does.
+    work = WORK.format(seconds=9)
+    nested = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {work!r}])"
+    program = turns.Program([script(work), script(nested)])
+    kept = []
+    try:
+        program.run(1.0)
+        for _ in range(2):
+            program.run(0.1)
+            first, second = (process.pid for process in program.processes)
+            (worker,) = psutil.Process(second).children()
+            assert os.sched_getaffinity(second) == set(cores)
+            kept.append([os.sched_getaffinity(pid) for pid in (first, worker.pid)])
+    finally:
+        program.kill()
+    assert all(len(one) == 1 for turn in kept for one in turn)
+    if len(cores) > 1:
+        assert kept[0][0] != kept[0][1]
+        assert kept[0][0] != kept[1][0]
 
 
 def test_program_that_fails_is_told_and_none_is_left(bench):

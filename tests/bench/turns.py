@@ -1,6 +1,7 @@
 """Programs that are measured by turns: while one runs, the others stand still.
 
 A machine that changes its speed within seconds, as virtual ones do, changes it for all of them.
+Its cores may differ for minutes, so that with every turn each process goes to another one.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import IO
+
+import psutil
 
 
 class Program:
@@ -35,6 +38,7 @@ class Program:
         self.seconds = 0.0
         """How long it has run."""
         self._begun = False
+        self._turns = 0
 
     def prepare(self) -> None:
         """Have it get ready, alone on the machine."""
@@ -45,6 +49,8 @@ class Program:
 
     def run(self, seconds: float) -> bool:
         """Let it run so long, and return whether it has ended; raise SystemExit where it failed."""
+        _change_cores([process.pid for process in self.processes], self._turns)
+        self._turns += 1
         began = time.perf_counter()
         if self._begun:
             os.killpg(self._group(), signal.SIGCONT)
@@ -115,6 +121,33 @@ def take_turns(programs: Sequence[Program], turn: float) -> None:
     finally:
         for program in programs:
             program.kill()
+
+
+def _change_cores(pids: Sequence[int], turn: int) -> None:
+    """Give each process that works a core, the next one with every turn.
+
+    Those that have processes of their own (a driver, a fork server) may be anywhere: they are
+    looked on as not working. Of the others two that work most never share a core.
+    """
+    cores = sorted(os.sched_getaffinity(0))
+    tree = []
+    for pid in pids:
+        with suppress(psutil.NoSuchProcess):
+            tree += [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
+    parents = {process.ppid() for process in tree}
+    working = [process for process in tree if process.pid not in parents]
+    working.sort(key=lambda process: sum(process.cpu_times()[:2]), reverse=True)
+    for process in tree:
+        _keep_to(process.pid, cores)
+    for k, process in enumerate(working):
+        _keep_to(process.pid, [cores[(k + turn) % len(cores)]])
+
+
+def _keep_to(pid: int, cores: Sequence[int]) -> None:
+    # A call for a process is one for its first thread only.
+    with suppress(FileNotFoundError, ProcessLookupError):
+        for thread in os.listdir(f"/proc/{pid}/task"):
+            os.sched_setaffinity(int(thread), cores)
 
 
 def _stream(stream: IO[str] | None) -> IO[str]:
