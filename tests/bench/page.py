@@ -150,8 +150,9 @@ _HEAD = """# Measured performance
 
 measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
 interleaved turns, of at least a second for each contender where peers are in the row. Whole
-commands, bare blocks and dgemm run by turns of a tenth of a second, one standing still while
-another runs, each charged with its own turns. One core unless workers are named.
+commands and bare blocks run by turns of half a second, bare blocks and dgemm by turns of a tenth,
+one standing still while another runs, each charged with its own turns. One core unless workers are
+named.
 Machine: {machine}; load average at the
 start {load:.1f}."""
 

@@ -26,8 +26,11 @@ PLANE = ROOT / "jobs" / "paper" / "plane.toml"
 MB = 1e6
 _SWEEP = (sys.executable, "-P", "-m", "chimera_hpc.sweep")
 _TURN = 0.1
-"""Seconds that a program runs before it is the other one's turn: a virtual machine may change its
-speed within a second."""
+"""Seconds that bare processes run before it is others' turn: a virtual machine may change its speed
+within a second."""
+_WHOLE_TURN = 0.5
+"""The same where a whole command is measured: what Dask's processes do by the clock is late when
+they are woken, which costs some milliseconds a turn that no run has."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def workers(
     cost = {}
     for n in (2, 1):
         alone = bare.program("blocks", n, blocks, folder)
-        take_turns([whole[n], alone], _TURN)
+        take_turns([whole[n], alone], _WHOLE_TURN)
         cost[n] = whole[n].seconds / alone.seconds - 1.0
     rows, gain = _two_processes(folder, blocks, products, cost)
     full = watched([*run, "--out", str(folder / "plane"), "--workers", "2"])
