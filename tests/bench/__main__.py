@@ -37,7 +37,7 @@ PARTS = (
     "reduction",
     "projection",
 )
-_PRODUCTS = 800
+_PIECES = 800
 """Pieces of dgemm that are about half as long as the bare blocks of the plane."""
 TINY = Sizes((4,), 2.0, 1.0, 1, 0.0, 1, (50, 100), 40, False)
 
@@ -78,8 +78,8 @@ def _part(part: str, sizes: Sizes, folder: Path, results: Results, tiny: bool) -
     if part == "sweeps":
         settings = ["P=3:4", "seeds=1", "integrator.t_end=20", "features.start=10"] if tiny else []
         seeds = (1,) if tiny else (1, 5)
-        products = 2 if tiny else _PRODUCTS
-        rows = sweeps.workers(folder, settings, seeds, products, results.scaling)
+        pieces = 2 if tiny else _PIECES
+        rows = sweeps.workers(folder, settings, seeds, pieces, results.scaling)
         return rows + sweeps.memory(folder, (55.0, 60.0) if tiny else (1000.0, 10_000.0))
     if part == "starting":
         return sweeps.starting(folder, 1 if tiny else 3)

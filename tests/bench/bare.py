@@ -16,7 +16,7 @@ from turns import Program
 _PRODUCT = 128
 """Rows of a matrix that dgemm multiplies: three of them fit into the second cache of a core."""
 _PRODUCTS = 1000
-"""Products that are taken at once."""
+"""Products in a piece of work."""
 
 
 def program(kind: str, processes: int, words: Sequence[str], folder: Path) -> Program:

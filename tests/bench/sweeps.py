@@ -70,7 +70,7 @@ def watched(
 
 
 def workers(
-    folder: Path, settings: list[str], seeds: tuple[int, ...], products: int, scaling: Scaling
+    folder: Path, settings: list[str], seeds: tuple[int, ...], pieces: int, scaling: Scaling
 ) -> list[Row]:
     """The plane with one worker and with two, and its blocks without executor and store."""
     options = [word for setting in settings for word in ("--set", setting)]
@@ -89,7 +89,8 @@ def workers(
         alone = bare.program("blocks", n, blocks, folder)
         take_turns([whole[n], alone], _WHOLE_TURN)
         cost[n] = whole[n].seconds / alone.seconds - 1.0
-    rows, gain = _two_processes(folder, blocks, products, cost)
+    rows = _two_processes(folder, blocks, pieces, cost)
+    gain = rows[0].value
     full = watched([*run, "--out", str(folder / "plane"), "--workers", "2"])
     note = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%} ({whole[2].seconds:.1f} s): "
     note += "start, planning, reduction included"
@@ -107,29 +108,27 @@ def workers(
 
 
 def _two_processes(
-    folder: Path, blocks: list[str], products: int, cost: dict[int, float]
-) -> tuple[list[Row], float]:
+    folder: Path, blocks: list[str], pieces: int, cost: dict[int, float]
+) -> list[Row]:
     """What a second worker gains, and what the machine's second core gives."""
     pairs = {}
     # What lasts longer gets longer turns, so that all end at about the same time. Only those that
     # have taken turns are compared, for the machine changes.
-    for kind, words, share in (("blocks", blocks, 1.0), ("dgemm", [str(products)], 0.5)):
+    for kind, words, share in (("blocks", blocks, 1.0), ("dgemm", [str(pieces)], 0.5)):
         pairs[kind] = [bare.program(kind, n, words, folder) for n in (1, 2)]
         pairs[kind][0].share, pairs[kind][1].share = 2.0 * share, share
     take_turns([program for pair in pairs.values() for program in pair], _TURN)
     limit, given = (one.seconds / two.seconds for one, two in pairs.values())
     gain = limit * (1.0 + cost[1]) / (1.0 + cost[2])
     one, two = (program.seconds for program in pairs["blocks"])
-    note = (
-        f"{limit:.2f} times without executor and store ({one:.1f} s and {two:.1f} s); with them, "
-    )
-    note += "see the overhead below"
+    note = f"{limit:.2f} times without executor and store ({one:.1f} s and {two:.1f} s); with "
+    note += "them, see the overhead below"
     machine = f"dgemm in two processes over one: {given:.2f} times, by turns with the bare blocks"
     return [
         Row("2 workers over 1, whole command", gain, "times", 1.9, True, note),
         Row("the same, of what two cores of this machine give", gain / given, "", 0.95, True,
             machine),
-    ], gain  # fmt: skip
+    ]  # fmt: skip
 
 
 def _whole(run: list[str], folder: Path, n: int) -> Program:

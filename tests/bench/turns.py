@@ -124,23 +124,31 @@ def take_turns(programs: Sequence[Program], turn: float) -> None:
 
 
 def _change_cores(pids: Sequence[int], turn: int) -> None:
-    """Give each process that works a core, the next one with every turn.
+    """Give each process that works a core of its own, the next one with every turn.
 
     Those that have processes of their own (a driver, a fork server) may be anywhere: they are
-    looked on as not working. Of the others two that work most never share a core.
+    looked on as not working. Of the others those that have worked most get the cores.
     """
     cores = sorted(os.sched_getaffinity(0))
-    tree = []
+    tree = _tree(pids)
+    parents = {parent for _, parent, _ in tree}
+    busiest = sorted((-spent, pid) for pid, _, spent in tree if pid not in parents)[: len(cores)]
+    own = {pid: k for k, pid in enumerate(sorted(pid for _, pid in busiest))}
+    for pid, _, _ in tree:
+        _keep_to(pid, [cores[(own[pid] + turn) % len(cores)]] if pid in own else cores)
+
+
+def _tree(pids: Sequence[int]) -> list[tuple[int, int, float]]:
+    """Processes and all of theirs: each one's number, its parent's, and its processor time."""
+    found = []
     for pid in pids:
         with suppress(psutil.NoSuchProcess):
-            tree += [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
-    parents = {process.ppid() for process in tree}
-    working = [process for process in tree if process.pid not in parents]
-    working.sort(key=lambda process: sum(process.cpu_times()[:2]), reverse=True)
-    for process in tree:
-        _keep_to(process.pid, cores)
-    for k, process in enumerate(working):
-        _keep_to(process.pid, [cores[(k + turn) % len(cores)]])
+            for process in (psutil.Process(pid), *psutil.Process(pid).children(recursive=True)):
+                # One that has not been stopped yet may end while it is looked at.
+                with suppress(psutil.NoSuchProcess):
+                    spent = sum(process.cpu_times()[:2])
+                    found.append((process.pid, process.ppid(), spent))
+    return found
 
 
 def _keep_to(pid: int, cores: Sequence[int]) -> None:
