@@ -39,6 +39,9 @@ PARTS = (
 )
 _PIECES = 800
 """Pieces of dgemm that are about half as long as the bare blocks of the plane."""
+_REPEATS = {1: 2, 2: 3}
+"""How often a whole command is compared with its bare blocks, by its workers: each time comes out
+another way by some percent, those that last longer by less."""
 TINY = Sizes((4,), 2.0, 1.0, 1, 0.0, 1, (50, 100), 40, False)
 
 
@@ -79,7 +82,8 @@ def _part(part: str, sizes: Sizes, folder: Path, results: Results, tiny: bool) -
         settings = ["P=3:4", "seeds=1", "integrator.t_end=20", "features.start=10"] if tiny else []
         seeds = (1,) if tiny else (1, 5)
         pieces = 2 if tiny else _PIECES
-        rows = sweeps.workers(folder, settings, seeds, pieces, results.scaling)
+        repeats = {1: 1, 2: 1} if tiny else _REPEATS
+        rows = sweeps.workers(folder, settings, seeds, pieces, repeats, results.scaling)
         return rows + sweeps.memory(folder, (55.0, 60.0) if tiny else (1000.0, 10_000.0))
     if part == "starting":
         return sweeps.starting(folder, 1 if tiny else 3)

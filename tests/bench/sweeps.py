@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,7 @@ _SWEEP = (sys.executable, "-P", "-m", "chimera_hpc.sweep")
 _TURN = 0.1
 """Seconds that bare processes run before it is others' turn: a virtual machine may change its speed
 within a second."""
-_WHOLE_TURN = 0.5
+_WHOLE_TURN = 1.0
 """The same where a whole command is measured: what Dask's processes do by the clock is late when
 they are woken, which costs some milliseconds a turn that no run has."""
 
@@ -70,9 +70,17 @@ def watched(
 
 
 def workers(
-    folder: Path, settings: list[str], seeds: tuple[int, ...], pieces: int, scaling: Scaling
+    folder: Path,
+    settings: list[str],
+    seeds: tuple[int, ...],
+    pieces: int,
+    repeats: dict[int, int],
+    scaling: Scaling,
 ) -> list[Row]:
-    """The plane with one worker and with two, and its blocks without executor and store."""
+    """The plane with one worker and with two, and its blocks without executor and store.
+
+    `repeats` says how often a whole command of so many workers and its bare blocks are compared.
+    """
     options = [word for setting in settings for word in ("--set", setting)]
     run = [*_SWEEP, "run", str(PLANE), *options]
     # The first run is not measured: it may have to compile the kernels.
@@ -83,21 +91,21 @@ def workers(
         if k > 0:
             scaling.points.append((_points(out), seconds))
     blocks = [str(PLANE), *settings]
-    whole = {n: _whole(run, folder, n) for n in (1, 2)}
-    cost = {}
-    for n in (2, 1):
-        alone = bare.program("blocks", n, blocks, folder)
-        take_turns([whole[n], alone], _WHOLE_TURN)
-        cost[n] = whole[n].seconds / alone.seconds - 1.0
+    pairs = {
+        n: [_beside_bare(run, blocks, folder, n, k) for k in range(times)]
+        for n, times in repeats.items()
+    }
+    cost = {n: statistics.median(whole / alone for whole, alone in pairs[n]) - 1.0 for n in pairs}
+    seconds = statistics.median(whole for whole, _ in pairs[2])
     rows = _two_processes(folder, blocks, pieces, cost)
     gain = rows[0].value
     full = watched([*run, "--out", str(folder / "plane"), "--workers", "2"])
-    note = f"1 worker {cost[1]:.1%}, 2 workers {cost[2]:.1%} ({whole[2].seconds:.1f} s): "
-    note += "start, planning, reduction included"
     size = _points(folder / "plane")
     # As if both had met the machine that the one with two workers met.
-    scaling.workers = [(1, gain * whole[2].seconds), (2, whole[2].seconds)]
-    scaling.points.append((size, whole[2].seconds))
+    scaling.workers = [(1, gain * seconds), (2, seconds)]
+    scaling.points.append((size, seconds))
+    note = "; ".join(_compared(n, pairs[n]) for n in sorted(pairs))
+    note += f"; {seconds:.1f} s with two; start, planning, reduction included"
     return [
         *rows,
         Row("whole command over bare blocks, minus one", max(cost.values()), "", 0.05, False, note),
@@ -131,9 +139,19 @@ def _two_processes(
     ]  # fmt: skip
 
 
-def _whole(run: list[str], folder: Path, n: int) -> Program:
-    out = ["--out", str(folder / f"plane-{n}"), "--workers", str(n), "--no-figures"]
-    return Program([[*run, *out]])
+def _beside_bare(
+    run: list[str], blocks: list[str], folder: Path, n: int, k: int
+) -> tuple[float, float]:
+    """Seconds of a whole command with so many workers, the `k`-th, and of its bare blocks."""
+    out = ["--out", str(folder / f"plane-{n}-{k}"), "--workers", str(n), "--no-figures"]
+    whole, alone = Program([[*run, *out]]), bare.program("blocks", n, blocks, folder)
+    take_turns([whole, alone], _WHOLE_TURN)
+    return whole.seconds, alone.seconds
+
+
+def _compared(n: int, pairs: Sequence[tuple[float, float]]) -> str:
+    each = ", ".join(f"{whole / alone - 1.0:.1%}" for whole, alone in pairs)
+    return f"{n} worker{'s' * (n > 1)}: {each}"
 
 
 def _points(out: Path) -> int:
