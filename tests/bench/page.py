@@ -152,8 +152,7 @@ measures all of this in one run, with the peers installed beside (`.venv-bench`)
 interleaved turns, of at least a second for each contender where peers are in the row. Whole
 commands and bare blocks run by turns of a second, bare blocks and dgemm by turns of a tenth, one
 standing still while another runs, each charged with its own turns. A whole command is compared
-twice with one worker and three times with two: medians, and each comparison in the last column.
-One core unless workers are named.
+several times: medians, and each comparison in the last column. One core unless workers are named.
 Machine: {machine}; load average at the
 start {load:.1f}."""
 

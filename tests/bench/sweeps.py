@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,12 +91,12 @@ def workers(
         if k > 0:
             scaling.points.append((_points(out), seconds))
     blocks = [str(PLANE), *settings]
-    pairs = {
+    compared = {
         n: [_beside_bare(run, blocks, folder, n, k) for k in range(times)]
         for n, times in repeats.items()
     }
-    cost = {n: statistics.median(whole / alone for whole, alone in pairs[n]) - 1.0 for n in pairs}
-    seconds = statistics.median(whole for whole, _ in pairs[2])
+    cost = {n: statistics.median(over for _, over in each) for n, each in compared.items()}
+    seconds = statistics.median(whole for whole, _ in compared[2])
     rows = _two_processes(folder, blocks, pieces, cost)
     gain = rows[0].value
     full = watched([*run, "--out", str(folder / "plane"), "--workers", "2"])
@@ -104,8 +104,10 @@ def workers(
     # As if both had met the machine that the one with two workers met.
     scaling.workers = [(1, gain * seconds), (2, seconds)]
     scaling.points.append((size, seconds))
-    note = "; ".join(_compared(n, pairs[n]) for n in sorted(pairs))
-    note += f"; {seconds:.1f} s with two; start, planning, reduction included"
+    note = ""
+    for n, each in compared.items():
+        note += f"{n} worker{'s' * (n > 1)}: {', '.join(f'{over:.1%}' for _, over in each)}; "
+    note += f"{seconds:.1f} s with two; start, planning, reduction included"
     return [
         *rows,
         Row("whole command over bare blocks, minus one", max(cost.values()), "", 0.05, False, note),
@@ -142,16 +144,11 @@ def _two_processes(
 def _beside_bare(
     run: list[str], blocks: list[str], folder: Path, n: int, k: int
 ) -> tuple[float, float]:
-    """Seconds of a whole command with so many workers, the `k`-th, and of its bare blocks."""
+    """Seconds of the `k`-th command with so many workers; its time over bare blocks minus one."""
     out = ["--out", str(folder / f"plane-{n}-{k}"), "--workers", str(n), "--no-figures"]
     whole, alone = Program([[*run, *out]]), bare.program("blocks", n, blocks, folder)
     take_turns([whole, alone], _WHOLE_TURN)
-    return whole.seconds, alone.seconds
-
-
-def _compared(n: int, pairs: Sequence[tuple[float, float]]) -> str:
-    each = ", ".join(f"{whole / alone - 1.0:.1%}" for whole, alone in pairs)
-    return f"{n} worker{'s' * (n > 1)}: {each}"
+    return whole.seconds, whole.seconds / alone.seconds - 1.0
 
 
 def _points(out: Path) -> int:
