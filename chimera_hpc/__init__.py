@@ -4,23 +4,26 @@ The public names are loaded when they are first used (PEP 562), so that ``import
 milliseconds: the kernels compile, and scikit-learn alone takes seconds.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from chimera_hpc.features import fourier_features
+    from chimera_hpc.measures import fourier_features
+    from chimera_hpc.measures.variation import total_variations
+    from chimera_hpc.models.custom import OwnModel
     from chimera_hpc.models.networked_fhn import NetworkedFHN
-    from chimera_hpc.reduce.variation import total_variations
-    from chimera_hpc.simulate import simulate
-    from chimera_hpc.store import open_sweep as open
-    from chimera_hpc.topology import Topology
+    from chimera_hpc.models.parameters import Limit, Parameter
+    from chimera_hpc.network.topology import Topology
+    from chimera_hpc.run.simulate import simulate
+    from chimera_hpc.store.labelled import open_sweep as open
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Limit",
     "NetworkedFHN",
+    "OwnModel",
+    "Parameter",
     "Topology",
     "__version__",
     "fourier_features",
@@ -31,25 +34,16 @@ __all__ = [
 
 # public name -> the module that has it, and its name there
 _EXPORTS = {
+    "Limit": ("chimera_hpc.models.parameters", "Limit"),
     "NetworkedFHN": ("chimera_hpc.models.networked_fhn", "NetworkedFHN"),
-    "Topology": ("chimera_hpc.topology", "Topology"),
-    "fourier_features": ("chimera_hpc.features", "fourier_features"),
-    "open": ("chimera_hpc.store", "open_sweep"),
-    "simulate": ("chimera_hpc.simulate", "simulate"),
-    "total_variations": ("chimera_hpc.reduce.variation", "total_variations"),
+    "OwnModel": ("chimera_hpc.models.custom", "OwnModel"),
+    "Parameter": ("chimera_hpc.models.parameters", "Parameter"),
+    "Topology": ("chimera_hpc.network.topology", "Topology"),
+    "fourier_features": ("chimera_hpc.measures", "fourier_features"),
+    "open": ("chimera_hpc.store.labelled", "open_sweep"),
+    "simulate": ("chimera_hpc.run.simulate", "simulate"),
+    "total_variations": ("chimera_hpc.measures.variation", "total_variations"),
 }
-
-
-class _Package(ModuleType):
-    """Keeps `simulate` the function: importing the module of that name would replace it."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if name in _EXPORTS and isinstance(value, ModuleType):
-            value = getattr(value, _EXPORTS[name][1])
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> object:

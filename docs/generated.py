@@ -9,14 +9,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from chimera_hpc.commands import COMMANDS
-from chimera_hpc.grid import Sweep
-from chimera_hpc.grid.parameters import DELTA, MODELS, Parameter
-from chimera_hpc.grid.schema import job_schema
-from chimera_hpc.layout import array_plans
-from chimera_hpc.shipped import job_file
-from chimera_hpc.status import Status
-from chimera_hpc.sweep import parser
+from chimera_hpc.base.status import Status
+from chimera_hpc.cli import COMMANDS
+from chimera_hpc.cli.main import parser
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.models import built_in
+from chimera_hpc.job.parameters import DELTA
+from chimera_hpc.job.schema import job_schema
+from chimera_hpc.job.shipped import job_file
+from chimera_hpc.models.parameters import Parameter
+from chimera_hpc.store.schema import array_plans
 
 _TOP = ("name", "title", "model")
 _WIDTH = "96"
@@ -48,7 +50,7 @@ def job_file_tables() -> str:
         f"`[grid]`: {properties['grid']['description']}",
         f"`[fixed]`: {properties['fixed']['description']}",
     ]
-    for name, model in MODELS.items():
+    for name, model in built_in().items():
         parts += [f"### {name}", _parameters((model.n_nodes, *model.parameters))]
         parts += [f"- {limit.text}" for limit in model.limits]
     parts.append(f"`{DELTA.name}` may be an axis of every model. {DELTA.text}")

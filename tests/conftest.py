@@ -30,6 +30,14 @@ BROWSER_PROGRAMS = ("chromium", "chromedriver")
 _NEEDS = {"slurm": ("SLURM", SLURM_PROGRAMS), "chromium": ("CHROMIUM", BROWSER_PROGRAMS)}
 
 
+@pytest.fixture
+def table() -> type:
+    """A stand-in for the points of a sweep (see `cells_table.Table`)."""
+    from cells_table import Table
+
+    return Table
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--run-slow", action="store_true", help="run the tests marked slow too")
 

@@ -9,9 +9,12 @@ import numba
 import numpy as np
 
 from chimera_hpc.integrate import lane_rows as K
-from chimera_hpc.integrate.driver import Control, Lanes, Outcome, integrate
-from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
+from chimera_hpc.integrate.lanes import Control, Lanes, Outcome, integrate
 from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
+from chimera_hpc.job import registry
+
+METHODS = {name: registry.method(name) for name in registry.METHODS}
 
 compiled = numba.njit(RIGHT_HAND_SIDE, nogil=True, error_model="numpy")
 

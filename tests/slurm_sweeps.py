@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chimera_hpc.ledger import read_ledger
+from chimera_hpc.store.ledger import read_ledger
 
 JOB = """
 name = "small"

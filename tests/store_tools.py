@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.claims import claim_block
-from chimera_hpc.grid import Sweep
-from chimera_hpc.layout import encode_series, scalar_labels, series_mask
-from chimera_hpc.status import Status
-from chimera_hpc.store import ClaimLost, Store
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Sweep
+from chimera_hpc.store.claims import ClaimLost, claim_block
+from chimera_hpc.store.schema import encode_series, scalar_labels, series_mask
+from chimera_hpc.store.store import Store
 
 JOB = """
 name = "small"

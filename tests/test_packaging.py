@@ -21,56 +21,24 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "chimera_hpc"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-# A module imports from its own line or from lines above; the same list stands in DESIGN.md.
+# A folder imports only from itself and from folders before it; DESIGN.md shows the same list.
 LAYERS = (
-    "errors",
-    "status",
-    "processes",
-    "files",
-    "shipped",
-    "topology",
-    "streams",
-    "grid",
+    "base",
+    "network",
     "integrate",
     "models",
-    "features",
-    "reduce.variation",
-    "simulate",
-    "claims",
-    "ledger",
-    "layout",
-    "task",
-    "provenance",
-    "compiled",
-    "store",
-    "reduce",
+    "measures",
+    "classify",
+    "job",
     "plot",
-    "outcome",
-    "curve_figures",
-    "figures",
-    "outputs.cells",
-    "outputs.selection",
-    "analyses",
-    "outputs",
-    "replay",
+    "store",
+    "run",
+    "reduction",
     "recordings",
-    "paper",
     "report",
-    "slurm.queue",
-    "slurm.walltime",
-    "orders",
-    "work",
-    "worker",
-    "execute",
-    "fork_server",
-    "cluster",
-    "slurm",
-    "progress",
-    "commands",
-    "sweep",
-    "forked",
+    "cli",
 )
-PRINTING = ("commands", "paper.reproduce", "progress", "report", "sweep")
+PRINTING = ("cli", "run.progress")
 
 
 def modules_loaded_by(statement: str) -> set[str]:
@@ -89,11 +57,11 @@ def test_importing_the_package_loads_nothing_heavy():
 
 def test_task_knows_neither_dask_nor_zarr():
     doors = {"dask", "distributed", "zarr"}
-    assert modules_loaded_by("import chimera_hpc.task") & doors == set()
+    assert modules_loaded_by("import chimera_hpc.run.block") & doors == set()
 
 
 def test_ledger_knows_no_zarr():
-    assert "zarr" not in modules_loaded_by("import chimera_hpc.ledger")
+    assert "zarr" not in modules_loaded_by("import chimera_hpc.store.ledger")
 
 
 @pytest.mark.parametrize("name", chimera_hpc.__all__)
@@ -111,20 +79,11 @@ def test_unknown_name_is_an_attribute_error():
     ("typed", "loaded"), [(["--help"], []), (["schema"], ["schema"]), (None, ["run", "schema"])]
 )
 def test_only_the_command_that_is_typed_is_loaded(typed, loaded):
-    code = f"import sys; from chimera_hpc.sweep import parser; parser(typed={typed})\n"
-    code += "print(*[name for name in sys.modules if name.startswith('chimera_hpc.commands.')])"
+    code = f"import sys; from chimera_hpc.cli.main import parser; parser(typed={typed})\n"
+    code += "print(*[name for name in sys.modules if name.startswith('chimera_hpc.cli.')])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    names = {name.removeprefix("chimera_hpc.commands.") for name in done.stdout.split()}
+    names = {name.removeprefix("chimera_hpc.cli.") for name in done.stdout.split()}
     assert {"run", "schema"} & names == set(loaded)
-
-
-def test_simulate_stays_the_function_after_its_module_was_imported():
-    code = (
-        "import chimera_hpc.simulate\n"
-        "from chimera_hpc import simulate\n"
-        "assert callable(simulate), simulate"
-    )
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
 def module_name(source: Path) -> str:
@@ -134,10 +93,8 @@ def module_name(source: Path) -> str:
 
 
 def layer(name: str) -> int:
-    """Position in LAYERS of the longest entry that the module is or lies in."""
-    inside = [entry for entry in LAYERS if f"{name}.".startswith(f"{entry}.")]
-    assert inside, f"chimera_hpc.{name} has no place in LAYERS yet"
-    return LAYERS.index(max(inside, key=len))
+    """Position in LAYERS of the folder that a module lies in."""
+    return LAYERS.index(name.partition(".")[0])
 
 
 def imported_modules(source: Path) -> Iterator[str]:
@@ -165,24 +122,38 @@ def is_module_or_parent(parts: list[str]) -> str:
     return ".".join(parts if found else parts[:-1])
 
 
+def test_top_level_holds_the_layers_and_two_files():
+    names = {path.name for path in PACKAGE.iterdir() if not path.name.startswith(("_", "."))}
+    assert names == {*LAYERS, "sweep.py", "py.typed"}
+
+
+def test_every_folder_says_in_one_sentence_what_it_is():
+    for name in LAYERS:
+        text = ast.get_docstring(ast.parse((PACKAGE / name / "__init__.py").read_text("utf-8")))
+        assert text, name
+        first = text.partition("\n\n")[0]
+        assert first.endswith("."), name
+        assert ". " not in first, name
+
+
 def test_design_lists_the_layers():
-    table = re.findall(
-        r"^\| (`.*?) \|", (ROOT / "DESIGN.md").read_text("utf-8"), flags=re.MULTILINE
-    )
-    assert tuple(re.findall(r"`([\w.]+)`", " ".join(table))) == LAYERS
+    text = (ROOT / "DESIGN.md").read_text("utf-8")
+    assert tuple(re.findall(r"^\| `(\w+)/` \|", text, flags=re.MULTILINE)) == LAYERS
 
 
 @pytest.mark.parametrize(
-    "source", [s for s in SOURCES if module_name(s)], ids=lambda s: module_name(s)
+    "source",
+    [s for s in SOURCES if module_name(s) not in ("", "sweep")],
+    ids=lambda s: module_name(s),
 )
-def test_imports_go_one_way(source):
+def test_imports_go_one_way_between_folders(source):
     own = layer(module_name(source))
     upward = [name for name in imported_modules(source) if layer(name) > own]
     assert upward == []
 
 
 def test_zarr_and_clusters_have_one_door_each():
-    doors = {"zarr": "store", "dask_jobqueue": "slurm"}
+    doors = {"zarr": "store", "dask_jobqueue": "run"}
     for source in SOURCES:
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []

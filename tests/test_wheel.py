@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from chimera_hpc import __version__
-from chimera_hpc.grid.schema import FILE_NAME, job_schema, schema_text
-from chimera_hpc.shipped import job_file, jobs_folder
+from chimera_hpc.job.schema import FILE_NAME, job_schema, schema_text
+from chimera_hpc.job.shipped import job_file, jobs_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 Run = Callable[..., str]

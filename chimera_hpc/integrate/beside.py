@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from chimera_hpc.integrate._jit import cache_folder, source_digest
-from chimera_hpc.processes import usable_cores
+from chimera_hpc.base.processes import usable_cores
+from chimera_hpc.integrate.jit import cache_folder, source_digest
 
 _COMPILE = """
 import sys
 sys.path[:] = {path!r}
-from chimera_hpc.integrate.kernel import advance
+from chimera_hpc.integrate.stepper import advance
 from chimera_hpc.integrate.simd import LANES
 for lanes in (1, LANES):
     advance(lanes)
@@ -44,7 +44,7 @@ def _is_worth_it() -> bool:
     folder = Path(cache_folder())
     # A folder for this process alone, where no other can be written, is of no use to two.
     shared = folder.name == source_digest()
-    return shared and usable_cores() > 1 and not any(folder.glob("*/kernel._advance_pack-*.nbc"))
+    return shared and usable_cores() > 1 and not any(folder.glob("*/stepper._advance_pack-*.nbc"))
 
 
 def _start() -> subprocess.Popen[bytes]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from chimera_hpc.integrate._jit import jit
+from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.lane_rows import ERROR_SUM
 from chimera_hpc.integrate.simd import fma, fold, larger, load, magnitude, splat, store
 

@@ -3,142 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.integrate._jit import jit
-from chimera_hpc.integrate.kernel import RIGHT_HAND_SIDE
-from chimera_hpc.integrate.simd import (
-    LANES,
-    fma,
-    last_of,
-    load,
-    load_at,
-    load_some,
-    splat,
-    store,
-    store_at,
-    store_some,
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.streams import stream_key, topology_stream
+from chimera_hpc.models.parameters import (
+    EPSILON,
+    HALF_DEGREE,
+    RING_LIMIT,
+    Limit,
+    ModelParameters,
+    Parameter,
+    ring_size,
 )
-from chimera_hpc.models.sliding import (
-    changes_along,
-    first_across,
-    first_along,
-    rest_across,
-    stride_across,
-)
-from chimera_hpc.topology import Topology
+from chimera_hpc.models.protocol import BuiltIn, Row
+from chimera_hpc.network.topology import Topology
 
 Array = NDArray[np.float64]
-
-THIRD = 1.0 / 3.0
-
-
-@jit()
-def _activator(u: Any, w: Any, rate: Any) -> Any:
-    # With the signs turned: (u^3 / 3 - u + w) * -rate.
-    return fma(u, fma(u * u, THIRD, -1.0), w) * (-1.0 * rate)
-
-
-@jit()
-def _recovery(u: Any, w: Any, source: Any, total: Any, width: Any, c: Any) -> Any:
-    return fma(c, w, source) - fma(-width, u, total)
-
-
-# (L0 u)_i = (2P + 1) u_i - sum_{|k| <= P} u_{i+k}, the sum being that of a sliding window.
-
-
-@jit()
-def _node(zero: Any, i: Any, total: Any, context: Any) -> None:
-    y, dy, params, n, width, c, rate = context
-    u, w = load(zero, y, i), load(zero, y, n + i)
-    store(dy, i, _activator(u, w, rate))
-    store(dy, n + i, _recovery(u, w, load(zero, params, 2 + i), total, width, c))
-
-
-@jit()
-def _reduced_across(zero: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
-    # Node by node, in all lanes together.
-    n, half = ints[0], ints[1]
-    rate, c = load(zero, params, 0), load(zero, params, 1)
-    context = (y, dy, params, n, 2.0 * half + 1.0, c, rate)
-    total = first_across(zero, y, 0, n, half)
-    for i in range(0, n - LANES + 1, LANES):
-        total = stride_across(zero, y, 0, n, half, total, i, _node, context)
-    rest_across(zero, y, 0, n, half, total, _node, context)
-
-
-@jit()
-def _reduced_along(y: Any, dy: Any, params: Any, ints: Any) -> None:
-    # One trajectory, eight nodes at a time.
-    n, half = ints[0], ints[1]
-    rate, c = params[0, 0], params[1, 0]
-    width = 2.0 * half + 1.0
-    before = first_along(y, 0, n, half)
-    for i in range(0, n, 8):
-        x = changes_along(y, 0, n, half, i)
-        total = before + x
-        before = before + last_of(x)
-        if i + 8 <= n:
-            u, w = load_at(y, i), load_at(y, n + i)
-            source = load_at(params, 2 + i)
-            store_at(dy, i, _activator(u, w, rate))
-            store_at(dy, n + i, _recovery(u, w, source, total, width, c))
-        else:
-            u, w = load_some(y, i, 0, n - i), load_some(y, n + i, 0, n - i)
-            source = load_some(params, 2 + i, 0, n - i)
-            store_some(dy, i, _activator(u, w, rate), n - i)
-            store_some(dy, n + i, _recovery(u, w, source, total, width, c), n - i)
-
-
-@jit()
-def _full(like: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
-    # Rows of y: u (n), then v of link i * P + (k - 1) between i and i + k; its orientation is the
-    # sign in params: +1 when i is the tail.
-    n, half = ints[0], ints[1]
-    rate, b, c = load(like, params, 0), load(like, params, 1), load(like, params, 2)
-    for i in range(n):
-        u = load(like, y, i)
-        store(dy, i, u - u * u * u * THIRD)
-    for i in range(n):
-        for k in range(1, half + 1):
-            j = i + k if i + k < n else i + k - n
-            link = i * half + k - 1
-            sign = load(like, params, 3 + link)
-            v = load(like, y, n + link)
-            store(dy, j, load(like, dy, j) - sign * v)
-            store(dy, i, load(like, dy, i) + sign * v)
-            flow = sign * (load(like, y, j) - load(like, y, i))
-            store(dy, n + link, b + c * v + flow)
-    for i in range(n):
-        store(dy, i, load(like, dy, i) * rate)
-
-
-def reduced_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
-    """Right-hand side of the reduced form; ``lane_params`` rows: 1/epsilon, c, b s_1 ... b s_N."""
-    if y.shape[1] == LANES:
-        _reduced_across(splat(0.0), y, dy, lane_params, int_params)
-    elif int_params[0] >= LANES:
-        _reduced_along(y, dy, lane_params, int_params)
-    else:
-        _reduced_across(0.0, y, dy, lane_params, int_params)
-
-
-def full_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
-    """Right-hand side of the node-link form; ``lane_params`` rows: 1/epsilon, b, c, link signs."""
-    if y.shape[1] == LANES:
-        _full(splat(0.0), y, dy, lane_params, int_params)
-    else:
-        _full(0.0, y, dy, lane_params, int_params)
-
-
-@cache
-def _compiled(form: str) -> Any:
-    return jit(RIGHT_HAND_SIDE)(reduced_rhs if form == "reduced" else full_rhs)
 
 
 @dataclass(frozen=True)
@@ -209,7 +94,9 @@ class TopologicalFHN:
     @property
     def right_hand_side(self) -> Any:
         """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
-        return _compiled(self.form)
+        from chimera_hpc.models.topological_fhn_kernels import compiled
+
+        return compiled(self.form)
 
     @property
     def int_params(self) -> NDArray[np.int64]:
@@ -283,3 +170,44 @@ class TopologicalFHN:
     def n_second(self) -> int:
         """Number of second variables v in an initial state."""
         return self.topology.n_links
+
+
+def _build(sweep: Any, row: Row) -> TopologicalFHN:
+    topology = Topology.ring(sweep.n_nodes, int(row["P"]), int(row["orientation"]))
+    topology = topology.reorient_node(0, int(row["Q"]))
+    flips = int(row["flips"])
+    if flips:
+        stream = topology_stream(*stream_key(sweep.model, sweep.n_nodes, row), flips)
+        among = topology.links_at(0) if int(row["flip_set"]) == 1 else None
+        topology = topology.reorient_random(flips, stream, among)
+    return TopologicalFHN(topology, row["epsilon"], row["b"], row["c"], sweep.integrator.form)
+
+
+PARAMETERS = ModelParameters(
+    n_nodes=ring_size(50),
+    parameters=(
+        Parameter("P", int, None, HALF_DEGREE, low=1, high=10**7),
+        Parameter("Q", int, None, "Links reoriented at node 1, on each side.", low=0, high=10**7),
+        Parameter("orientation", int, 1, "Rule that orients the ring's links.", low=1, high=2),
+        EPSILON,
+        Parameter("b", float, 0.5, "Excitability."),
+        Parameter("c", float, -0.01, "Self-coupling of the links."),
+        Parameter("flips", int, 0, "Links reversed at random, Q_r.", low=0, high=10**15),
+        Parameter(
+            "flip_set", int, 0, "Links to draw those from: 0 all, 1 node 1's.", low=0, high=1
+        ),
+    ),
+    limits=(
+        RING_LIMIT,
+        Limit("Q", ("P",), lambda columns, _: columns["P"], "Q may not exceed P"),
+        Limit(
+            "flips",
+            ("P", "flip_set"),
+            lambda columns, n: np.where(columns["flip_set"] == 1, 2, n) * columns["P"],
+            "flips may not exceed the number of links, n_nodes * P (2 P of them at node 1)",
+        ),
+    ),
+    forms=("reduced", "full"),
+)
+
+MODEL = BuiltIn(PARAMETERS, _build)

@@ -1,1 +1,1 @@
-"""One function a figure: takes arrays, returns a matplotlib Figure, writes nothing."""
+"""One function per figure: arrays in, matplotlib Figure out; nothing is written."""

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from numpy.typing import ArrayLike, NDArray
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.plot import style
 from chimera_hpc.plot.portrait import draw_nullcline
 

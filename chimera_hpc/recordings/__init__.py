@@ -1,1 +1,1 @@
-"""Recordings of others: read, put on an even grid of times, measured, judged by an atlas."""
+"""Time series of other people: read, resampled, measured, and judged by an atlas."""

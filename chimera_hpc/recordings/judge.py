@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.features import FourierFeatures, fourier_features
-from chimera_hpc.features.windows import maxima
-from chimera_hpc.grid.tables import Features
-from chimera_hpc.outputs.atlases import load_atlas
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify import tree
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.job.tables import Features
+from chimera_hpc.measures import FourierFeatures, fourier_features
+from chimera_hpc.measures.variation import total_variation_arrays
+from chimera_hpc.measures.windows import maxima
 from chimera_hpc.recordings.gaps import called
 from chimera_hpc.recordings.prepare import Prepared
-from chimera_hpc.reduce import tree
-from chimera_hpc.reduce.atlas import Atlas
-from chimera_hpc.reduce.results import TRIPLET
-from chimera_hpc.reduce.variation import total_variation_arrays
-from chimera_hpc.status import Status
-from chimera_hpc.store import Store
+from chimera_hpc.reduction.atlases import load_atlas
+from chimera_hpc.reduction.results import TRIPLET
+from chimera_hpc.store.store import Store
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch
 from chimera_hpc.recordings.recording import Recording
 

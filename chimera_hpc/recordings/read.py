@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.recording import Choice, Recording, as_signals, as_times, turned
 from chimera_hpc.recordings.tables import read_table
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 
 Array = NDArray[np.float64]
 

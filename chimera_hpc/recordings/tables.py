@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.recording import Choice, Recording, as_signals, as_times
 
 _HEAD = 50

@@ -1,8 +1,4 @@
-"""One HTML file to look at a sweep: map, tree, projections, pictures, failures, provenance.
-
-The file holds all that it shows, Bokeh's scripts included, and asks the network for nothing. It is
-made from the store and, where there is one, results.json beside it.
-"""
+"""The report of a sweep: one HTML file with map, tree, projections, pictures, failures."""
 
 from chimera_hpc.report.page import REPORT, Report, write_report
 

@@ -11,17 +11,17 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.ledger import LedgerScan
-from chimera_hpc.outputs.cells import FreeAxis, describe, free_axes
-from chimera_hpc.outputs.reduction import RESULTS
-from chimera_hpc.reduce.classify import Classification, Cut, classify
-from chimera_hpc.reduce.modes import count_votes, modal_labels, vote_labels
-from chimera_hpc.reduce.naming import NO_WINDOW, STEADY
-from chimera_hpc.reduce.results import TRIPLET, count_points, read_results
-from chimera_hpc.status import Status
-from chimera_hpc.store import Store
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import Classification, Cut, classify
+from chimera_hpc.classify.modes import count_votes, modal_labels, vote_labels
+from chimera_hpc.classify.naming import NO_WINDOW, STEADY
+from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
+from chimera_hpc.reduction.reduction import RESULTS
+from chimera_hpc.reduction.results import TRIPLET, count_points, read_results
 from chimera_hpc.store.labelled import STORE_NAME
+from chimera_hpc.store.ledger import LedgerScan
+from chimera_hpc.store.store import Store
 
 Integers = NDArray[np.int64]
 

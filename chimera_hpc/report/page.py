@@ -18,16 +18,16 @@ from bokeh.resources import INLINE
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from chimera_hpc import __version__
-from chimera_hpc.errors import BadInput
-from chimera_hpc.files import write_atomically
-from chimera_hpc.outputs.atlases import curves_beside
-from chimera_hpc.reduce.results import TRIPLET
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import write_atomically
+from chimera_hpc.base.status import Status
+from chimera_hpc.reduction.atlases import curves_beside
+from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.report import charts
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.payload import Shown, axis_labels, payload
 from chimera_hpc.report.pictures import MOST_CELLS, plates
 from chimera_hpc.report.tree_top import top_of
-from chimera_hpc.status import Status
 from chimera_hpc.store.runs import read_run, read_work, run_numbers
 
 REPORT = "report.html"

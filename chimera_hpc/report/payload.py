@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.outputs.cells import number
+from chimera_hpc.base.status import Status
+from chimera_hpc.reduction.cells import number
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import looks_of
 from chimera_hpc.report.pictures import Plates, rounded
 from chimera_hpc.report.tree_top import TreeTop
-from chimera_hpc.status import Status
 
 MOST_CELLS = 10_000
 MOST_POINTS = 6_000

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.grid.tables import Keep
-from chimera_hpc.layout import FEATURES, sample_times, series_mask
-from chimera_hpc.reduce.modes import vote_labels
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.modes import vote_labels
+from chimera_hpc.job.tables import Keep
 from chimera_hpc.report.content import Content
-from chimera_hpc.status import Status
+from chimera_hpc.store.schema import FEATURES, sample_times, series_mask
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def _replay(content: Content, points: NDArray[np.int64]) -> Array:
     """Compute the series (n, T, N) of points anew."""
     if not len(points):
         return np.empty((0, 0, 0))
-    from chimera_hpc.task import run_block
+    from chimera_hpc.run.block import run_block
 
     sweep = content.store.sweep
     sweep = sweep.model_copy(update={"keep": Keep(series="all", dtype="float32")})

@@ -13,11 +13,11 @@ from zarr.abc.buffer import Buffer
 from zarr.buffer import cpu
 from zarr.storage import MemoryStore
 
-from chimera_hpc.files import write_together
-from chimera_hpc.grid import Sweep
-from chimera_hpc.layout import BLOCK_ARRAYS, MISSING, ArrayPlan, block_plans
-from chimera_hpc.ledger import canonical, chunk_name, seal, sealed_size, unseal
-from chimera_hpc.status import Status
+from chimera_hpc.base.files import write_together
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Sweep
+from chimera_hpc.store.ledger import canonical, chunk_name, seal, sealed_size, unseal
+from chimera_hpc.store.schema import BLOCK_ARRAYS, MISSING, ArrayPlan, block_plans
 from chimera_hpc.store.template import create_array
 
 _INDEX_ENTRY = 16

@@ -7,9 +7,9 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.ledger import FIELDS, LedgerScan, digests
-from chimera_hpc.status import Status
+from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import BlockFiles, Damage, DamagedChunk
+from chimera_hpc.store.ledger import FIELDS, LedgerScan, digests
 
 _RETRY_SECONDS = 0.5
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.status import Status
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
 from chimera_hpc.store.store import Store
 
 if TYPE_CHECKING:

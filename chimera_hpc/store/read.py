@@ -6,11 +6,11 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.layout import decode_series
-from chimera_hpc.ledger import LedgerScan, read_block, table_columns
-from chimera_hpc.status import Status
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import BlockFiles, Damage, DamagedChunk
+from chimera_hpc.store.ledger import LedgerScan, read_block, table_columns
+from chimera_hpc.store.schema import decode_series
 
 
 def gather(files: BlockFiles, name: str, scan: LedgerScan) -> NDArray[np.float64]:

@@ -15,9 +15,9 @@ import zarr
 from numpy.typing import ArrayLike, NDArray
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.files import remove_leftovers, sync_folder, sync_tree, temporary_name
-from chimera_hpc.ledger import SEPARATOR
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import remove_leftovers, sync_folder, sync_tree, temporary_name
+from chimera_hpc.store.ledger import SEPARATOR
 from chimera_hpc.store.template import REDUCTION as NAME
 
 Variable = tuple[tuple[str, ...], ArrayLike] | tuple[tuple[str, ...], ArrayLike, Mapping[str, Any]]

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.files import create_exclusively, write_atomically
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import create_exclusively, write_atomically
 
 FOLDER = "runs"
 

@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.claims import FOLDER as CLAIMS
-from chimera_hpc.claims import Claim, remove_stale
-from chimera_hpc.errors import BadInput
-from chimera_hpc.files import remove_leftovers
-from chimera_hpc.grid import Points, Sweep
-from chimera_hpc.grid.together import points_of
-from chimera_hpc.layout import BLOCK_ARRAYS, scalar_labels, series_mask
-from chimera_hpc.ledger import (
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import remove_leftovers
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.together import points_of
+from chimera_hpc.store.blocks import BlockFiles, Damage
+from chimera_hpc.store.check import find_damaged, shallow_damage
+from chimera_hpc.store.claims import FOLDER as CLAIMS
+from chimera_hpc.store.claims import Claim, remove_stale
+from chimera_hpc.store.extend import exclusive, extend, repair_metadata
+from chimera_hpc.store.ledger import (
     FAILED,
     NO_LIMIT,
     LedgerScan,
@@ -29,19 +32,16 @@ from chimera_hpc.ledger import (
     table_columns,
     unfinished,
 )
-from chimera_hpc.status import Status
-from chimera_hpc.store.blocks import BlockFiles, Damage
-from chimera_hpc.store.check import find_damaged, shallow_damage
-from chimera_hpc.store.extension import exclusive, extend, repair_metadata
 from chimera_hpc.store.read import gather, read_series
 from chimera_hpc.store.reduction import Reduction, Variable, read_reduction, write_reduction
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import start_run
+from chimera_hpc.store.schema import BLOCK_ARRAYS, scalar_labels, series_mask
 from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
 from chimera_hpc.store.write import Receipt, write_block
 
 if TYPE_CHECKING:
-    from chimera_hpc.task import BlockResult
+    from chimera_hpc.store.block_result import BlockResult
 
 _FREE_TABLES = ("name", "title", "reduction", "run", "slurm")
 """What a job may change between two runs on one store."""
@@ -234,7 +234,7 @@ class Store:
     # Writing
 
     def start_run(self, info: Mapping[str, Any]) -> int:
-        """Record a run (see `chimera_hpc.provenance`) and return its number for the ledger."""
+        """Record a run (see `store.provenance`) and return its number for the ledger."""
         return start_run(self.path, info)
 
     def write_block(

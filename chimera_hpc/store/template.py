@@ -15,26 +15,32 @@ from zarr.codecs import BloscCodec, Crc32cCodec, TransposeCodec, ZstdCodec
 from zarr.core.metadata.v3 import ArrayV3Metadata
 from zarr.storage import StoreLike
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.files import (
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import (
     remove_leftovers,
     sync_folder,
     sync_tree,
     temporary_name,
     write_atomically,
 )
-from chimera_hpc.grid import Points, Sweep, block_size
-from chimera_hpc.grid.parameters import look_in, model_folder
-from chimera_hpc.grid.spec import spec_digest
-from chimera_hpc.layout import (
+from chimera_hpc.base.streams import STREAM_TAG
+from chimera_hpc.job import Points, Sweep, block_size
+from chimera_hpc.job.models import look_in, model_folder
+from chimera_hpc.job.spec import spec_digest
+from chimera_hpc.store.ledger import (
+    METADATA,
+    METADATA_COPY,
+    SEPARATOR,
+    metadata_copy,
+    read_metadata,
+)
+from chimera_hpc.store.schema import (
     BLOCK_ARRAYS,
     ArrayPlan,
     array_plans,
     block_plans,
     sample_times,
 )
-from chimera_hpc.ledger import METADATA, METADATA_COPY, SEPARATOR, metadata_copy, read_metadata
-from chimera_hpc.streams import STREAM_TAG
 
 SCHEMA = 1
 """Version of the store's layout, in its root attributes."""

@@ -10,13 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.claims import Claim, ClaimLost
-from chimera_hpc.ledger import FIELDS, RESULTS, canonical, read_block, stored_digests, table_columns
-from chimera_hpc.status import Status
+from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import BlockFiles, DamagedChunk
+from chimera_hpc.store.claims import Claim, ClaimLost
+from chimera_hpc.store.ledger import (
+    FIELDS,
+    RESULTS,
+    canonical,
+    read_block,
+    stored_digests,
+    table_columns,
+)
 
 if TYPE_CHECKING:
-    from chimera_hpc.task import BlockResult
+    from chimera_hpc.store.block_result import BlockResult
 
 Rows = dict[str, NDArray[Any]]
 

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from chimera_hpc.models.user import Limit, OwnModel, Parameter
+from chimera_hpc import Limit, OwnModel, Parameter
 
 
 def right_hand_side(y, dy, p, ints):

@@ -16,7 +16,7 @@ eq:FHNnet); another one is a matter of two lines below.
 
 import math
 
-from chimera_hpc.models.user import Limit, OwnModel, Parameter
+from chimera_hpc import Limit, OwnModel, Parameter
 
 
 def right_hand_side(y, dy, p, ints):

@@ -109,9 +109,9 @@ def _single(part: str, sizes: Sizes, results: Results, tiny: bool) -> list[Row]:
 def _reduction(folder: Path, results: Results, tiny: bool) -> list[Row]:
     from reduction import sizes as at_sizes
 
-    from chimera_hpc.reduce.results import TRIPLET
-    from chimera_hpc.status import Status
-    from chimera_hpc.store import Store
+    from chimera_hpc.base.status import Status
+    from chimera_hpc.reduction.results import TRIPLET
+    from chimera_hpc.store.store import Store
 
     store = folder / "plane" / "store.zarr"
     source = np.random.default_rng(1).random((500, 3))

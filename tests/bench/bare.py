@@ -33,9 +33,9 @@ def command(kind: str, words: Sequence[str], folder: Path) -> list[str]:
 def _blocks(job: str, *settings: str) -> list[Callable[[], object]]:
     from functools import partial
 
-    from chimera_hpc.grid import Sweep
-    from chimera_hpc.grid.blocks import block_size, blocks
-    from chimera_hpc.task import run_block, warm_up
+    from chimera_hpc.job import Sweep
+    from chimera_hpc.job.blocks import block_size, blocks
+    from chimera_hpc.run.block import run_block, warm_up
 
     sweep = Sweep.load(Path(job), settings)
     points = sweep.points()

@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.provenance import cpu_model
+from chimera_hpc.store.provenance import cpu_model
 
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "jax", "diffrax", "dask", "zarr")
 

@@ -10,12 +10,12 @@ import psutil
 from programs import SCALE, load_program
 from projection import Costs
 
-from chimera_hpc.execute import run_dask
-from chimera_hpc.grid import Sweep
-from chimera_hpc.ledger import read_ledger
-from chimera_hpc.orders import Orders
-from chimera_hpc.store import Store
-from chimera_hpc.task import run_block, warm_up
+from chimera_hpc.job import Sweep
+from chimera_hpc.run.block import run_block, warm_up
+from chimera_hpc.run.executors import run_dask
+from chimera_hpc.run.messages import Orders
+from chimera_hpc.store.ledger import read_ledger
+from chimera_hpc.store.store import Store
 
 QUICKSTART = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from problems import Ring, error
 
 from chimera_hpc import simulate
-from chimera_hpc.integrate import METHODS
-from chimera_hpc.integrate.driver import Control, Outcome, integrate
+from chimera_hpc.integrate.lanes import Control, Outcome, integrate
+from chimera_hpc.job import registry
 from chimera_hpc.models.topological_fhn import TopologicalFHN
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ def curves(tolerances: tuple[float, ...], repeats: int, with_jax: bool) -> dict[
     reference = ring.reference(0, 20.0)
     u0, v0 = ring.initial(0)
     runs: dict[str, Callable[[float], Array]] = {}
-    for method in METHODS:
+    for method in registry.METHODS:
         runs[f"ours, {method}"] = lambda rtol, method=method: (
             simulate(
                 ring.topology, u0=u0, v0=v0, t_end=20.0, rtol=rtol, atol=1e-3 * rtol, method=method

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.reduce.classify import classify
-from chimera_hpc.status import Status
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import classify
 
 Array = NDArray[np.float64]
 

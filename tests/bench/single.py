@@ -17,11 +17,11 @@ from problems import Ring, error
 from scipy.integrate import solve_ivp
 
 from chimera_hpc import simulate
-from chimera_hpc.integrate import METHODS
-from chimera_hpc.integrate.driver import Control, Outcome, choose_lanes, integrate
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.lanes import Control, Outcome, choose_lanes, integrate
+from chimera_hpc.job import registry
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
-from chimera_hpc.status import Status
 
 Array = NDArray[np.float64]
 
@@ -238,7 +238,7 @@ def lane_steps(rings: Sequence[tuple[int, int, int]], repeats: int) -> list[Lane
 
 def nodes_in_second_cache() -> int:
     """Return the nodes of a ring whose state, stages and errors fill the second cache."""
-    return second_cache() // ((METHODS["tsit5"].stages + 3) * 2 * 8)
+    return second_cache() // ((registry.method("tsit5").stages + 3) * 2 * 8)
 
 
 def _in_second_caches(n_nodes: int) -> float:
@@ -249,7 +249,7 @@ def _by_cache(costs: Sequence[tuple[int, float]]) -> dict[str, list[tuple[int, f
     """Return the costs of rings by where their state is and how many go side by side."""
     parts: dict[str, list[tuple[int, float]]] = {}
     for n, cost in costs:
-        lanes = choose_lanes(8, 2 * n, METHODS["tsit5"].stages, 1, 1)
+        lanes = choose_lanes(8, 2 * n, registry.method("tsit5").stages, 1, 1)
         if lanes > 1:
             where = f"{lanes} trajectories side by side"
         elif _in_second_caches(n) <= 1.0:
@@ -302,7 +302,7 @@ def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
 
 def features(sizes: Sizes) -> list[Row]:
     """What is measured of a trajectory, against its integration in lanes."""
-    from chimera_hpc.grid import Sweep
+    from chimera_hpc.job import Sweep
 
     text = 'name = "x"\nmodel = "topological_fhn"\n[grid]\nP = 12\nQ = "P"\nseeds = 16\n'
     text += f"[integrator]\nt_end = {1000.0 if sizes.steps > 1000 else 60.0}\n"
@@ -318,7 +318,7 @@ def features(sizes: Sizes) -> list[Row]:
 
 def _whole_and_measuring(sweep: Any, points: Any) -> tuple[float, float]:
     """Return the seconds of a block, and those of them between the end of a run and its result."""
-    from chimera_hpc import task
+    from chimera_hpc.run import block as task
 
     block: Any = task._Block
     measure, spent = block.measure, []

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from chimera_hpc.sweep import main, parser
+from chimera_hpc.cli.main import main, parser
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -211,15 +211,15 @@ def _import_everything(folder: Path) -> None:
     import distributed
     import sklearn.preprocessing
 
-    import chimera_hpc.cluster
-    import chimera_hpc.execute
-    import chimera_hpc.outputs
-    import chimera_hpc.outputs.selection
-    import chimera_hpc.store.merging
+    import chimera_hpc.reduction
+    import chimera_hpc.reduction.selection
+    import chimera_hpc.run.executors
+    import chimera_hpc.run.local_cluster
+    import chimera_hpc.run.worker
+    import chimera_hpc.store.merge
     import chimera_hpc.sweep
-    import chimera_hpc.worker
-    from chimera_hpc.grid import Sweep
-    from chimera_hpc.task import warm_up
+    from chimera_hpc.job import Sweep
+    from chimera_hpc.run.block import warm_up
 
     assert all((distributed, sklearn.preprocessing, chimera_hpc))
     sweep = Sweep.from_toml_text(JOB)

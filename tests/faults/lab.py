@@ -326,8 +326,8 @@ def _write_points(store: Path, target: Path) -> int:
     """Decode every chunk, and compute all digests from the bytes on the disk."""
     from hashlib import blake2b
 
-    from chimera_hpc.ledger import digests
-    from chimera_hpc.store import Store
+    from chimera_hpc.store.ledger import digests
+    from chimera_hpc.store.store import Store
 
     opened = Store.open(store)
     ledger, columns = opened.ledger(), opened.points.columns

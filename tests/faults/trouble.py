@@ -20,10 +20,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from chimera_hpc.grid import Sweep
-from chimera_hpc.grid.parameters import ModelParameters, Parameter
+from chimera_hpc.job import Sweep
+from chimera_hpc.models.parameters import ModelParameters, Parameter
 from chimera_hpc.models.topological_fhn import TopologicalFHN
-from chimera_hpc.topology import Topology
+from chimera_hpc.network.topology import Topology
 
 _STEP = 16_000_000
 _ENOUGH = 1_500_000_000

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.integrate import beside
-from chimera_hpc.integrate._jit import source_digest
 from chimera_hpc.integrate.beside import stepping_loops_beside
-from chimera_hpc.processes import usable_cores
+from chimera_hpc.integrate.jit import source_digest
 
 _WARM_UP = """
 import json, sys
@@ -26,7 +26,7 @@ class Listener(event.Listener):
     def on_end(self, e): pass
 event.register("numba:compile", Listener())
 from store_tools import small_sweep
-from chimera_hpc.task import warm_up
+from chimera_hpc.run.block import warm_up
 sweep = small_sweep()
 warm_up(sweep, sweep.points())
 json.dump(compiled, sys.stdout)
@@ -85,7 +85,7 @@ def test_no_process_beside_where_it_is_of_no_use(
 ) -> None:
     if reason == "compiled":
         (folder / "integrate_0").mkdir()
-        (folder / "integrate_0" / "kernel._advance_pack-1.py311.1.nbc").touch()
+        (folder / "integrate_0" / "stepper._advance_pack-1.py311.1.nbc").touch()
     elif reason == "one core":
         monkeypatch.setattr(beside, "usable_cores", lambda: 1)
     else:

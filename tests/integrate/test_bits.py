@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernel_tools import run_all
 
+from chimera_hpc.base.status import Status
 from chimera_hpc.integrate import lane_rows as K
-from chimera_hpc.integrate.driver import Control, Lanes
+from chimera_hpc.integrate.lanes import Control, Lanes
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
-from chimera_hpc.status import Status
-from chimera_hpc.topology import Topology
+from chimera_hpc.network.topology import Topology
 
 CONTROL = Control(6.0, 3.0, 0.01)
 N_RUNS = 11

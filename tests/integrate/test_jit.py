@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import chimera_hpc
-from chimera_hpc.integrate import _jit
-from chimera_hpc.integrate._jit import cache_folder, jit, source_digest
-from chimera_hpc.simulate import simulate
-from chimera_hpc.topology import Topology
+from chimera_hpc.integrate import jit as _jit
+from chimera_hpc.integrate.jit import cache_folder, jit, source_digest
+from chimera_hpc.network.topology import Topology
+from chimera_hpc.run.simulate import simulate
 
 PACKAGE = Path(chimera_hpc.__file__).parent
 
@@ -70,8 +70,8 @@ def test_a_second_process_compiles_nothing():
     saved = [line for line in output if "data saved" in line]
     loaded = [line for line in output if "data loaded" in line]
     assert saved == []
-    assert any("kernel._advance_one" in line for line in loaded)
-    assert any("topological_fhn.reduced_rhs" in line for line in loaded)
+    assert any("stepper._advance_one" in line for line in loaded)
+    assert any("topological_fhn_kernels.reduced_rhs" in line for line in loaded)
     assert all(f"/{source_digest()}/" in line for line in loaded)
 
 
@@ -91,13 +91,13 @@ def digest_now():
 @pytest.mark.parametrize(
     "file",
     [
-        "integrate/kernel.py",
+        "integrate/stepper.py",
         "integrate/simd.py",
-        "integrate/_jit.py",
-        "models/topological_fhn.py",
-        "models/networked_fhn.py",
-        "features/lines.py",
-        "features/series.py",
+        "integrate/jit.py",
+        "models/topological_fhn_kernels.py",
+        "models/networked_fhn_kernels.py",
+        "measures/lines.py",
+        "measures/series.py",
     ],
 )
 def test_an_edit_of_a_kernel_changes_the_cache_folder(copied_package, file):
@@ -120,7 +120,7 @@ def test_an_edit_elsewhere_keeps_the_compiled_kernels(copied_package):
 
 def test_every_file_with_a_kernel_is_in_the_digest():
     for file in PACKAGE.rglob("*.py"):
-        uses = re.search(r"_jit import [^\n]*\bjit\b", file.read_text())
+        uses = re.search(r"\.jit import [^\n]*\bjit\b", file.read_text())
         assert not uses or file.parent.name in _jit._KERNEL_FOLDERS, file
 
 
@@ -140,7 +140,7 @@ def test_an_edit_of_a_called_kernel_is_obeyed_by_the_next_process(tmp_path):
 
     before = run()
     assert before == run() == run_here() + "\n"
-    kernel = copy / "integrate" / "kernel.py"
+    kernel = copy / "integrate" / "stepper.py"
     kernel.write_text(kernel.read_text().replace("SAFETY, SMALLEST, ", "SMALLEST, SAFETY, "))
     assert run() != before
     assert len(list(cache.iterdir())) == 2
@@ -209,7 +209,7 @@ def test_kernels_are_compiled_in_one_place_and_without_fast_math():
         names = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
         options = {node.arg for node in ast.walk(tree) if isinstance(node, ast.keyword)}
         assert not options & {"fastmath", "parallel"}, file
-        if file.name != "_jit.py":
+        if file.name != "jit.py":
             assert not names & {"njit", "jit", "vectorize", "guvectorize"}, file
 
 
@@ -248,7 +248,7 @@ def test_kernels_do_the_same_without_compilation():
 
 RUN_PACK = """
 import numpy as np
-from chimera_hpc.integrate.driver import Control, integrate
+from chimera_hpc.integrate.lanes import Control, integrate
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 
 def run():

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from kernel_tools import System, fixed_steps, kepler, linear, run_all
+from kernel_tools import METHODS, System, fixed_steps, kepler, linear, run_all
 from scipy.linalg import expm
 
-from chimera_hpc.integrate import METHODS
-from chimera_hpc.integrate.driver import Control
+from chimera_hpc.integrate.lanes import Control
 
 methods = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 ECCENTRICITY = 0.3
@@ -65,7 +64,7 @@ def slope(counts, errors):
 def test_solution_converges_with_its_order(method, name):
     (system, y0, exact), t_end = PROBLEMS[name]
     counts = counts_of(name, method)
-    ends, _ = fixed_steps(system, y0, counts, t_end, method.name)
+    ends, _ = fixed_steps(system, y0, counts, t_end, method)
     errors = np.abs(ends - exact([t_end])).max(axis=0)
     assert slope(counts, errors) == pytest.approx(method.order, abs=0.2)
 
@@ -76,7 +75,7 @@ def test_samples_inside_the_steps_converge_with_the_order_of_the_interpolant(met
     # An interpolant of order q is wrong by h**(q + 1) inside a step.
     (system, y0, exact), t_end = PROBLEMS[name]
     counts, sampling = counts_of(name, method), t_end / 997
-    _, samples = fixed_steps(system, y0, counts, t_end, method.name, sampling)
+    _, samples = fixed_steps(system, y0, counts, t_end, method, sampling)
     times = Control(t_end, 0.0, sampling).times
     errors = np.abs(samples - exact(times)).max(axis=(1, 2))
     order = min(method.order, method.interpolant_order + 1)
@@ -90,7 +89,7 @@ def test_error_follows_the_tolerance(method, name):
     tolerances = 10.0 ** -np.arange(3, 12)
     errors = []
     for tolerance in tolerances:
-        control = Control(t_end, 0.0, 0.01, rtol=tolerance, atol=tolerance, method=method.name)
+        control = Control(t_end, 0.0, 0.01, rtol=tolerance, atol=tolerance, method=method)
         (run,) = run_all([system], [y0], control)
         assert run.outcome.n_sampled == control.n_samples
         errors.append(np.abs(run.samples - exact(control.times)).max())

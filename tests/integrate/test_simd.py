@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernel_tools import compiled
 
-from chimera_hpc.integrate.memory import aligned
+from chimera_hpc.integrate.scratch import aligned
 from chimera_hpc.integrate.simd import (
     LANES,
     across,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from kernel_tools import System, powers, run_all
 
-from chimera_hpc.integrate.driver import Control
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.lanes import Control
 from chimera_hpc.integrate.simd import LANES
-from chimera_hpc.status import Status
 
 ONE = np.ones(2)
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import naive
 import numpy as np
 import pytest
-from kernel_tools import run_all
+from kernel_tools import METHODS, run_all
 
-from chimera_hpc.integrate import METHODS
-from chimera_hpc.integrate.driver import Control
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.lanes import Control
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
-from chimera_hpc.status import Status
-from chimera_hpc.topology import Topology
+from chimera_hpc.network.topology import Topology
 
 
 def python_function(model):
@@ -43,7 +42,7 @@ MODELS = dict(models())
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_loop_equals_the_plain_integrator_bit_for_bit(model, method, lanes):
     y0 = np.random.default_rng(1).uniform(-0.1, 0.1, model.n_rows)
-    control = Control(3.0, 0.0, 0.0173, rtol=1e-3, atol=1e-6, method=method)
+    control = Control(3.0, 0.0, 0.0173, rtol=1e-3, atol=1e-6, method=METHODS[method])
     (run,) = run_all([model], [y0], control, lanes=lanes)
     samples, y_end, accepted, tried, t = naive.runge_kutta(
         python_function(model), y0, METHODS[method], 3.0, control.times, 1e-3, 1e-6

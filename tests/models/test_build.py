@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chimera_hpc.grid import Sweep
-from chimera_hpc.models import build, initial_state
+from chimera_hpc.base.streams import initial_stream, topology_stream
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.models import build
 from chimera_hpc.models.networked_fhn import NetworkedFHN
-from chimera_hpc.streams import initial_stream, topology_stream
-from chimera_hpc.topology import Topology
+from chimera_hpc.network.topology import Topology
+from chimera_hpc.run.initial_state import initial_state
 
 
 def sweep(text="", model="topological_fhn", grid='P = [4]\nQ = "P"\nseeds = [7]'):

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from chimera_hpc.grid import Sweep
-from chimera_hpc.models import build
-from chimera_hpc.simulate import simulate
-from chimera_hpc.store import Store
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.models import build
+from chimera_hpc.run.simulate import simulate
+from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "jobs" / "examples"

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.networked_fhn import NetworkedFHN
-from chimera_hpc.simulate import simulate
-from chimera_hpc.status import Status
+from chimera_hpc.run.simulate import simulate
 
 
 def twin(model):

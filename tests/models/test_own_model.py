@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.models.user import OwnModel, Parameter
-from chimera_hpc.store import Store
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.models.custom import OwnModel, Parameter
+from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
 MODULE = """
 import numba
 import numpy as np
-from chimera_hpc.models.user import Limit, OwnModel, Parameter
+from chimera_hpc.models.custom import Limit, OwnModel, Parameter
 
 {before}
 
@@ -198,8 +198,8 @@ def test_results_follow_an_edit_of_the_model(apart: None, tmp_path: Path) -> Non
 
 
 def test_edit_of_a_module_beside_it_is_seen_in_the_record(apart: None, tmp_path: Path) -> None:
-    from chimera_hpc.grid import Sweep
-    from chimera_hpc.provenance import model_source
+    from chimera_hpc.job import Sweep
+    from chimera_hpc.store.provenance import model_source
 
     (tmp_path / "mine_helper.py").write_text("FACTOR = 1.0\n")
     job = write(tmp_path, "mine_source", before="import mine_helper")

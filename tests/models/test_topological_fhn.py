@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_tools import run_all
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.integrate.driver import Control
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.lanes import Control
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.topological_fhn import TopologicalFHN
-from chimera_hpc.simulate import simulate
-from chimera_hpc.status import Status
-from chimera_hpc.topology import Topology
+from chimera_hpc.network.topology import Topology
+from chimera_hpc.run.simulate import simulate
 
 # Made once by SciPy's DOP853 at rtol 3e-14 from the node-link equations as the paper prints them.
 REFERENCE = np.load(Path(__file__).parents[1] / "data" / "trajectories.npz")

@@ -3,19 +3,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chimera_hpc.analyses import ANALYSES, Given, analyse
-from chimera_hpc.grid import Sweep
-from chimera_hpc.grid.selection import ANALYSES as KNOWN
-from chimera_hpc.reduce.atlas import Atlas
-from chimera_hpc.reduce.classify import classify
-from chimera_hpc.reduce.stability import (
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.classification import classify
+from chimera_hpc.classify.stability import (
     block_eigenvalues,
     full_spectrum,
     predicted_spectrum,
     residual,
     spectrum_distance,
 )
-from chimera_hpc.topology import Topology
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.selection import ANALYSES as KNOWN
+from chimera_hpc.network.topology import Topology
+from chimera_hpc.reduction.analyses import ANALYSES, Given, analyse
 
 DONE, STEADY, FAILED = 1, 2, 4
 ATLAS = Atlas(

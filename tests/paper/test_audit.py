@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scoreboard.audit import compare, labels_of, variants
+from scoreboard.audit_figures import audit_figure, draw_audit
+from scoreboard.audit_text import cells_table, chimeras_line, jobs_table
+from scoreboard.cells import audit_cells, resample, share_of, total_variation
 
-from chimera_hpc.grid import Sweep
-from chimera_hpc.paper.audit import compare, labels_of, variants
-from chimera_hpc.paper.audit_figures import audit_figure, draw_audit
-from chimera_hpc.paper.audit_text import cells_table, chimeras_line, jobs_table
-from chimera_hpc.paper.cells import audit_cells, resample, share_of, total_variation
+from chimera_hpc.job import Sweep
 
 
 def test_audit_counts_changes_and_moves() -> None:

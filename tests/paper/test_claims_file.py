@@ -4,13 +4,13 @@ import inspect
 from pathlib import Path
 
 import pytest
+from scoreboard.claims import markdown, read_claims, scoreboard, summary
+from scoreboard.evidence import Evidence
+from scoreboard.plan import JOBS, QUICK, load
+from scoreboard.rules import RULES
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.grid import Sweep
-from chimera_hpc.paper.claims import markdown, read_claims, scoreboard, summary
-from chimera_hpc.paper.evidence import Evidence
-from chimera_hpc.paper.plan import JOBS, QUICK, load
-from chimera_hpc.paper.rules import RULES
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.job import Sweep
 
 FOLDER = Path(__file__).parents[2] / "jobs" / "paper"
 CLAIMS = read_claims(FOLDER / "claims.toml")

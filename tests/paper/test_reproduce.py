@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from chimera_hpc.paper.claims import read_claims
-from chimera_hpc.paper.reproduce import main, write_scoreboard
+from scoreboard.claims import read_claims
+from scoreboard.reproduce import main, write_scoreboard
 
 ROOT = Path(__file__).parents[2]
 
@@ -43,7 +42,7 @@ def test_a_call_that_only_judges_keeps_audit_and_times(tmp_path: Path) -> None:
 def test_the_thinned_reproduction_ends_well_and_keeps_the_claims_that_survive(
     tmp_path: Path,
 ) -> None:
-    command = [sys.executable, "-P", "-m", "chimera_hpc.paper.reproduce", "--quick"]
+    command = [sys.executable, "-P", "-m", "scoreboard.reproduce", "--quick"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     ended = subprocess.run(
         [*command, "--out", str(tmp_path), "--workers", "2"],

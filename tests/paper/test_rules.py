@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-from chimera_hpc.paper.evidence import Evidence, Missing, family_of, select, wanted
-from chimera_hpc.paper.rules import NOT_REPRODUCED, REPRODUCED, RULES
+from scoreboard.evidence import Evidence, Missing, family_of, select, wanted
+from scoreboard.rules import NOT_REPRODUCED, REPRODUCED, RULES
 
 COUNTS = ("total", "done", "steady", "no_window", "failed", "pending")
 

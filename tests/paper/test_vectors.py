@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chimera_hpc.features.incoherence import (
+from chimera_hpc.measures.incoherence import (
     discontinuity_measure,
     local_sigma,
     sigma,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.recordings.judge import verdict_of
-from chimera_hpc.reduce.atlas import Atlas
 
 # Two classes on a line of a cube of side 10: runs at 0, 1, 2 and at 8, 10, scaled by 10.
 ATLAS = Atlas(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch
 from chimera_hpc.recordings.prepare import prepare, with_times
 from chimera_hpc.recordings.recording import Recording

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chimera_hpc.errors import BadInput
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.read import read_recording
 from chimera_hpc.recordings.recording import Choice, Recording
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from store_tools import block_results, make_store
 
-from chimera_hpc.status import Status
-from chimera_hpc.store import Store
+from chimera_hpc.base.status import Status
+from chimera_hpc.store.store import Store
 
 CENTRES = ((0.05, 0.01, 0.001), (0.3, 0.1, 0.11), (0.55, 0.02, 0.01))
 """Variations of ordered, chimera and disordered runs; the class of a cell is P modulo 3."""

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from browser import Browser, browser
 
-from chimera_hpc.outputs import reduce_sweep
+from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.report import write_report
 
 pytestmark = [pytest.mark.chromium, pytest.mark.slow]

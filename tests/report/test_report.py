@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chimera_hpc.outputs import reduce_sweep
-from chimera_hpc.reduce.classify import Classification
+from chimera_hpc.classify.classification import Classification
+from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.report import content as contents
 from chimera_hpc.report import pictures, write_report
 from chimera_hpc.report.content import Content
@@ -18,7 +18,7 @@ from chimera_hpc.report.looks import look_of
 from chimera_hpc.report.page import MOST_FAILURES
 from chimera_hpc.report.pictures import Plates, evenly_spread, plates, representatives
 from chimera_hpc.report.tree_top import top_of
-from chimera_hpc.store import DamagedChunk
+from chimera_hpc.store.blocks import DamagedChunk
 from chimera_hpc.sweep import main
 
 FAST = "reduction.figures=[]"

@@ -157,8 +157,8 @@ def plan(folder: Path, name: str, n_points: int) -> Done:
     """Plan the store of a sweep, as `run` does before it begins."""
     job, path = folder / f"{name}.toml", folder / name / "store.zarr"
     job.write_text(JOB.format(values=n_points // 10_000))
-    program = "from sys import argv; from chimera_hpc.grid import Sweep; "
-    program += "from chimera_hpc.store import Store; Store.plan(argv[2], Sweep.load(argv[1]))"
+    program = "from sys import argv; from chimera_hpc.job import Sweep; "
+    program += "from chimera_hpc.store.store import Store; Store.plan(argv[2], Sweep.load(argv[1]))"
     done = run("-c", program, job, path)
     return Done(done.seconds, done.memory, done.text, path)
 
@@ -168,9 +168,9 @@ def serial_rate(folder: Path) -> float:
     sys.path.insert(0, str(FOLDER))
     import nothing  # noqa: F401
 
-    from chimera_hpc.orders import Orders
-    from chimera_hpc.store import Store
-    from chimera_hpc.work import do_block
+    from chimera_hpc.run.messages import Orders
+    from chimera_hpc.run.work import do_block
+    from chimera_hpc.store.store import Store
 
     path = plan(folder, "serial", SMALL).path
     orders, n_blocks = Orders(path, 1), Store.open(path).n_blocks
@@ -186,9 +186,9 @@ def scheduler_memory(folder: Path, path: Path) -> int:
     """Do a whole sweep over a scheduler of its own; return the bytes that it occupies then."""
     from distributed import Client
 
-    from chimera_hpc.execute import run_dask
-    from chimera_hpc.orders import Orders
-    from chimera_hpc.store import Store
+    from chimera_hpc.run.executors import run_dask
+    from chimera_hpc.run.messages import Orders
+    from chimera_hpc.store.store import Store
 
     store = Store.open(path)
     done = []

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from chimera_hpc import work
-from chimera_hpc.grid import Points, Sweep
-from chimera_hpc.status import Status
-from chimera_hpc.task import BlockResult, failed_block
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.run import work
+from chimera_hpc.store.block_result import BlockResult, failed_block
 
 
 def nothing(

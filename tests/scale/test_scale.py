@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from programs import SCALE, load_program
 
-from chimera_hpc import work
-from chimera_hpc.grid import Points, Sweep
-from chimera_hpc.ledger import FIELDS, chunk_name, seal
-from chimera_hpc.orders import Orders
-from chimera_hpc.status import Status
-from chimera_hpc.store import Store
-from chimera_hpc.task import BlockResult, failed_block
-from chimera_hpc.work import do_block
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.run import work
+from chimera_hpc.run.messages import Orders
+from chimera_hpc.run.work import do_block
+from chimera_hpc.store.block_result import BlockResult, failed_block
+from chimera_hpc.store.ledger import FIELDS, chunk_name, seal
+from chimera_hpc.store.store import Store
 
 MILLION = 1_000_000
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from store_tools import fill, make_store
 
-from chimera_hpc.store import Store
+from chimera_hpc.store.store import Store
 
 
 @pytest.fixture(scope="session")

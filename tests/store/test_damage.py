@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from store_tools import block_results, results, small_sweep
 
-from chimera_hpc.claims import claim_block
-from chimera_hpc.errors import BadInput
-from chimera_hpc.status import Status
-from chimera_hpc.store import DamagedChunk, Store
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.store.blocks import DamagedChunk
+from chimera_hpc.store.claims import claim_block
+from chimera_hpc.store.store import Store
 
 ARRAYS = ("u", "features", "scalars", "ledger")
 
@@ -197,7 +198,7 @@ def test_only_left_over_temporary_files_are_removed(store: Store) -> None:
 
 
 def _mark(pid: int) -> str:
-    from chimera_hpc.processes import process_mark
+    from chimera_hpc.base.processes import process_mark
 
     machine, _, start = process_mark().split("-")
     return f"{machine}-{pid}-{start}"

@@ -10,8 +10,8 @@ import pytest
 from store_tools import block_results, make_store
 
 import chimera_hpc
-from chimera_hpc.status import Status
-from chimera_hpc.store import Store
+from chimera_hpc.base.status import Status
+from chimera_hpc.store.store import Store
 
 NAMES = ["ordered", "chimera", "steady", "no_window"]
 

@@ -13,9 +13,9 @@ import xarray as xr
 from store_tools import block_results, fill, make_store, results
 
 import chimera_hpc
-from chimera_hpc.errors import BadInput
-from chimera_hpc.store import Store
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.store.runs import read_run, run_numbers
+from chimera_hpc.store.store import Store
 
 
 @pytest.fixture

@@ -16,12 +16,12 @@ import pytest
 import zarr
 from store_tools import block_results, fill, make_store, plan, process_context, small_sweep
 
-from chimera_hpc.errors import BadInput
-from chimera_hpc.layout import room
-from chimera_hpc.ledger import FIELDS
-from chimera_hpc.status import Status
-from chimera_hpc.store import Store
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.store.ledger import FIELDS
 from chimera_hpc.store.reduction import write_reduction
+from chimera_hpc.store.schema import room
+from chimera_hpc.store.store import Store
 
 
 def nodes(store: Store) -> dict[str, Any]:

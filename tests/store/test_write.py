@@ -19,11 +19,11 @@ from store_tools import (
     work,
 )
 
-from chimera_hpc.claims import Claim, claim_block
-from chimera_hpc.ledger import digests
-from chimera_hpc.status import Status
-from chimera_hpc.store import ClaimLost, Store
+from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import BlockFiles
+from chimera_hpc.store.claims import Claim, ClaimLost, claim_block
+from chimera_hpc.store.ledger import digests
+from chimera_hpc.store.store import Store
 
 
 @pytest.fixture
@@ -151,7 +151,7 @@ def test_block_without_any_series_still_has_its_shard(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dtype", ["int16", "float32"])
 def test_values_beyond_the_range_are_missing_only_in_int16(tmp_path: Path, dtype: str) -> None:
-    from chimera_hpc.layout import encode_series
+    from chimera_hpc.store.schema import encode_series
 
     store = make_store(tmp_path, f"keep.dtype={dtype}")
     made = block_results(store, 0)

@@ -1,0 +1,1 @@
+"""What every other folder may need: errors, statuses, files, processes, random streams."""

@@ -1,0 +1,169 @@
+"""Files that are whole or absent, whatever dies in between.
+
+A file is written under a temporary name in its own folder, flushed to the disk, and renamed; the
+folder is flushed last. A reader therefore sees the old contents or the new ones, and after a loss
+of power a file that was written later never stands without the ones written before it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import time
+import uuid
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from chimera_hpc.base.processes import is_gone, process_mark
+
+HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
+"""Errors that the next write would run into as well."""
+_SUFFIX = ".partial"
+LEFTOVER_AGE = 3600.0
+"""Seconds after which the temporary file of an unknown process counts as left over."""
+
+
+def temporary_name(path: Path) -> Path:
+    """Return a fresh name beside `path` that tells which process it belongs to."""
+    return path.with_name(f".{path.name}.{process_mark()}.{uuid.uuid4().hex[:8]}{_SUFFIX}")
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Replace or create `path` with `data`; on return it is on the disk, name and contents."""
+    write_together([(path, data)])
+
+
+def write_together(contents: Sequence[tuple[Path, bytes]]) -> None:
+    """Write several files as `write_atomically` does, one after the other, but flush them together.
+
+    On return all of them are on the disk; before, any first few of them may be.
+    """
+    with contextlib.ExitStack() as stack:
+        files = [stack.enter_context(_written(path, data)) for path, data in contents]
+        for temporary, _ in files:
+            _flush(temporary)
+        for temporary, path in files:
+            os.replace(temporary, path)
+    for folder in dict.fromkeys(path.parent for path, _ in contents):
+        sync_folder(folder)
+
+
+def create_exclusively(path: Path, data: bytes, *, durable: bool = True) -> bool:
+    """Create `path` with `data` unless it exists; return whether this call created it.
+
+    Unless `durable`, it need not outlast a loss of power.
+
+    The contents are linked into place whole, so that no reader ever finds the file empty; and a
+    link is made or refused by the file server itself, also on network file systems where an
+    exclusive open is not dependable. A server's answer may get lost and the repeated request be
+    refused although the first one succeeded: the number of links of the temporary file then tells
+    the truth. Where hard links are not offered the file is opened exclusively.
+    """
+    with _written(path, data) as (temporary, _):
+        if durable:
+            _flush(temporary)
+        try:
+            os.link(temporary, path)
+        except FileExistsError:
+            created = temporary.stat().st_nlink == 2
+        except OSError as error:
+            if error.errno not in (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS):
+                raise
+            created = _open_exclusively(path, data)
+        else:
+            created = True
+    if durable:
+        sync_folder(path.parent)
+    return created
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the names in a folder to the disk."""
+    _flush(folder)
+
+
+def sync_tree(folder: Path) -> None:
+    """Flush every file and folder below and including `folder` to the disk."""
+    for place, _, names in os.walk(folder):
+        for name in names:
+            _flush(Path(place, name))
+        _flush(Path(place))
+
+
+def remove_leftovers(folder: Path) -> int:
+    """Delete what killed writers left in `folder` under temporary names; return how many went.
+
+    A temporary file or folder is left over when its process is gone from this machine, or when it
+    has not changed for `LEFTOVER_AGE`.
+    """
+    count = 0
+    with contextlib.suppress(FileNotFoundError):
+        for path in folder.glob(f".*{_SUFFIX}"):
+            if is_leftover(path):
+                _remove(path)
+                count += 1
+    return count
+
+
+def is_leftover(path: Path) -> bool:
+    """Whether a file or folder under a temporary name was abandoned by its writer."""
+    mark = path.name.removesuffix(_SUFFIX).rpartition(".")[0].rpartition(".")[2]
+    try:
+        age = time.time() - path.stat().st_mtime
+    except FileNotFoundError:
+        return False
+    return is_gone(mark) or age > LEFTOVER_AGE
+
+
+def server_time(folder: Path) -> float:
+    """Return the present time by the clock that stamps the files of `folder` (s since 1970).
+
+    Hosts that share a folder may disagree about the time; ages of files are compared with this
+    clock.
+    """
+    probe = temporary_name(folder / "clock")
+    probe.touch()
+    try:
+        return probe.stat().st_mtime
+    finally:
+        probe.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _written(path: Path, data: bytes) -> Iterator[tuple[Path, Path]]:
+    """Yield a temporary file with the data and its final path; afterwards it is gone."""
+    temporary = temporary_name(path)
+    try:
+        with temporary.open("xb") as file:
+            file.write(data)
+        yield temporary, path
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _open_exclusively(path: Path, data: bytes) -> bool:
+    try:
+        with path.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+    except FileExistsError:
+        return False
+    return True

@@ -1,0 +1,73 @@
+"""Random streams of a point: a function of what the point is, never of how or where it is run.
+
+The key of a point is the row of integers (STREAM_TAG, model, n_nodes, orientation, P, Q, seed), the
+model entering as the first 8 bytes of the BLAKE2b digest of its name, little-endian, without the
+lowest bit. Nothing else enters: neither epsilon, b, c, a tolerance, the form of the equations nor
+the radius of the initial state, so that two runs that differ only in those start from the same
+random numbers, and adding points later changes no existing one.
+
+Each integer of the key is written as an int64 (two little-endian 32-bit words), which makes the map
+from keys to entropy one-to-one. `numpy.random.SeedSequence` over these words feeds PCG64; its spawn
+key separates the two sub-streams, 0 for the initial state and 1 for the topology, whose key ends
+with the number of reversed links.
+
+Test vectors (first two raw 64-bit outputs):
+
+>>> initial_stream("topological_fhn", 50, 1, 12, 12, 0).bit_generator.random_raw(2).tolist()
+[11704978848883669759, 6404558520510686158]
+>>> topology_stream("topological_fhn", 50, 1, 13, 13, 3, 40).bit_generator.random_raw(2).tolist()
+[1450647402846782716, 8634726795373142443]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from hashlib import blake2b
+from operator import index
+
+import numpy as np
+
+STREAM_TAG = 1
+"""Version of the key; part of every key, so that a change of the rule is a change of the tag."""
+
+
+def stream_key(
+    model: str, n_nodes: int, row: Mapping[str, int | float]
+) -> tuple[str, int, int, int, int, int]:
+    """Return what the random streams of a point depend on: model, N0, orientation, P, Q, seed."""
+    # A user's model need not know orientation, P or Q.
+    ring = (row.get("orientation", 1), row.get("P", 0), row.get("Q", 0))
+    orientation, half_degree, reoriented, seed = (int(number) for number in (*ring, row["seed"]))
+    return model, int(n_nodes), orientation, half_degree, reoriented, seed
+
+
+def initial_stream(
+    model: str, n_nodes: int, orientation: int, P: int, Q: int, seed: int
+) -> np.random.Generator:
+    """Return the generator of the initial state of a point (see the module's text for the key).
+
+    Raises TypeError for a number that is not an integer, OverflowError for one beyond int64.
+    """
+    return _generator(0, model, n_nodes, orientation, P, Q, seed)
+
+
+def topology_stream(
+    model: str, n_nodes: int, orientation: int, P: int, Q: int, seed: int, flips: int
+) -> np.random.Generator:
+    """Return the generator that draws which `flips` links of a point are reversed.
+
+    Independent of `initial_stream` for the same point: the initial state does not depend on
+    `flips`. Raises as `initial_stream` does.
+    """
+    return _generator(1, model, n_nodes, orientation, P, Q, seed, flips)
+
+
+def _generator(sub_stream: int, model: str, *numbers: int) -> np.random.Generator:
+    key = [STREAM_TAG, _model_number(model), *map(index, numbers)]
+    words = np.array(key, dtype="<i8").view("<u4").astype(np.uint32)
+    sequence = np.random.SeedSequence(words, spawn_key=(sub_stream,))
+    return np.random.Generator(np.random.PCG64(sequence))
+
+
+def _model_number(model: str) -> int:
+    return int.from_bytes(blake2b(model.encode(), digest_size=8).digest(), "little") >> 1

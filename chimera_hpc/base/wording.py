@@ -1,0 +1,22 @@
+"""Values and names as they stand in one-line messages."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+
+
+def short(value: object) -> str:
+    """Return the value as it may stand in a one-line message."""
+    if isinstance(value, int) and abs(value) >= 10**30:
+        return "a huge integer"  # too long ones cannot even be printed
+    try:
+        text = repr(value)
+    except RecursionError:
+        return "a deeply nested value"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(name: str, known: list[str]) -> str:
+    """Return '; did you mean X?' or, when nothing is near, '; known: X, Y, Z'."""
+    near = get_close_matches(name[:60], known, n=1)
+    return f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}"

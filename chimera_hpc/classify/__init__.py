@@ -1,0 +1,1 @@
+"""Trees, classes, modal classes, atlases, densities, basins, robustness: arrays in, arrays out."""

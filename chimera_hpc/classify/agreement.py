@@ -1,0 +1,60 @@
+"""One sweep judged by several methods: classes by strength of incoherence, confusion matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chimera_hpc.classify.naming import CLASSES
+from chimera_hpc.classify.tree import Integers
+
+
+def classes_by_incoherence(strength: ArrayLike) -> list[str]:
+    """Name runs by their strength of incoherence: 0 ordered, 1 disordered, between chimera.
+
+    Gopal, Chandrasekar, Venkatesan, Lakshmanan 2014, doi:10.1103/PhysRevE.89.052914.
+    """
+    ordered, chimera, disordered = CLASSES
+    return [
+        ordered if s <= 0.0 else disordered if s >= 1.0 else chimera
+        for s in np.asarray(strength, dtype=np.float64).tolist()
+    ]
+
+
+@dataclass(frozen=True)
+class Confusion:
+    """How often one method says row and the other says column."""
+
+    classes: tuple[str, ...]
+    counts: Integers
+    """(k, k)"""
+
+    @property
+    def agreement(self) -> float:
+        """Share of runs on the diagonal; NaN without runs."""
+        total = int(self.counts.sum())
+        return float(np.trace(self.counts) / total) if total else float("nan")
+
+    @property
+    def kappa(self) -> float:
+        """Cohen's kappa: agreement beyond chance, (p_o - p_e) / (1 - p_e); NaN if undefined."""
+        total = int(self.counts.sum())
+        if not total:
+            return float("nan")
+        by_chance = float(self.counts.sum(axis=0) @ self.counts.sum(axis=1)) / total**2
+        return (self.agreement - by_chance) / (1.0 - by_chance) if by_chance < 1.0 else float("nan")
+
+
+def confusion(
+    first: Sequence[str | None], second: Sequence[str | None], classes: Sequence[str] = CLASSES
+) -> Confusion:
+    """Count pairs of verdicts on the same runs; those outside `classes` are left out."""
+    position = {name: i for i, name in enumerate(classes)}
+    counts = np.zeros((len(classes), len(classes)), dtype=np.int64)
+    for one, other in zip(first, second, strict=True):
+        if one in position and other in position:
+            counts[position[one], position[other]] += 1
+    return Confusion(tuple(classes), counts)

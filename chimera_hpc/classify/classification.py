@@ -1,0 +1,228 @@
+"""From triplets of total variations to named classes (paper, ssec:classific).
+
+The triplets (V_theta, V_a, V_Omega) of all oscillating runs are scaled to [0, 1], merged bottom-up
+into one tree, and the tree is cut by number of clusters or at a depth threshold d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify import naming, tree
+from chimera_hpc.classify.tree import Floats, Integers, Split
+
+LARGEST_TREE: dict[tree.Linkage, int] = {"ward": 50_000, "average": 10_000, "complete": 10_000}
+"""Points in one tree: 8 s for as many with Ward's linkage; 0.8 GB and 4 s with the others."""
+
+_BINS = 8
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The tree cut into k named classes, in the order of the base classes, then of suffixes."""
+
+    labels: Integers
+    """(n,): class of each point, -1 for points that were not clustered."""
+    names: tuple[str, ...]
+    families: tuple[str, ...]
+    """Base class of each class: its name without the suffix."""
+    centroids: Floats
+    """(k, 3): mean of (V_theta, V_a, V_Omega), not scaled."""
+    sizes: Integers
+    """(k,): number of points."""
+    depth: float
+    """Height at which a line across the dendrogram makes this cut."""
+
+
+@dataclass(frozen=True)
+class Classification:
+    """A tree over the clustered points and its cuts."""
+
+    method: tree.Linkage
+    linkage: Floats
+    """(m - 1, 4): SciPy's linkage matrix over the m members."""
+    members: Integers
+    """(m,): index of the point behind each leaf of the tree."""
+    scaler: Floats
+    """(2, 3): smallest and largest V_theta, V_a, V_Omega of all clustered points."""
+    scaled: Floats
+    """(m, 3): the members in scaled space."""
+    cuts: dict[int, Cut]
+    """By the number of clusters asked for."""
+    base: Cut
+    """The cut whose classes the naming rule names directly; it need not be among `cuts`."""
+    depth: float | None
+    """The depth threshold asked for, if any; its cut is in `cuts` under its number of clusters."""
+    sampled: bool
+    """Whether the tree holds a sample only, and other points took the label of the nearest leaf."""
+
+    def order_of_splits(self, until: int = 8) -> tuple[Split, ...]:
+        """Tell which base class splits at each step as the depth threshold falls."""
+        leaf_labels = self.base.labels[self.members]
+        return tree.splits_below(self.linkage, leaf_labels, self.base.names, until)
+
+
+def classify(
+    triplets: ArrayLike,
+    status: ArrayLike,
+    *,
+    linkage: tree.Linkage = "ward",
+    cuts: Sequence[int] = (3, 4, 5),
+    depth: float | None = None,
+    names: naming.Rule = "triplet",
+    largest_tree: int | None = None,
+    known: tuple[Floats, Integers] | None = None,
+) -> Classification:
+    """Cluster the points whose status is DONE and name the clusters.
+
+    Parameters
+    ----------
+    triplets : (n, 3) array
+        V_theta, V_a, V_Omega; rows of points that are not DONE are ignored (NaN is fine there).
+    status : (n,) integers
+        `chimera_hpc.base.status.Status` of each point.
+    linkage : {"ward", "average", "complete"}
+    cuts : numbers of clusters. A cut never parts equal points, so it may hold fewer classes than
+        asked for (down to none when nothing oscillates).
+    depth : depth threshold d in scaled space: merges higher than d are undone.
+    names : "triplet" or a list of names by rising V_theta; see `naming.name_base`.
+        Finer cuts inherit the names along the tree and get suffixes where a class really split.
+    largest_tree : beyond this many points (`LARGEST_TREE` by default) the tree grows over a sample
+        of about that size, drawn without chance: points are ordered by box of an 8 x 8 x 8 grid
+        over scaled space and taken at equal distances in that order, and the first point of each
+        box is always in. All others take the class of the nearest sampled point.
+        `Classification.sampled` tells.
+    known : linkage and members of an earlier classification of the same points, which spares
+        growing the tree again.
+
+    Notes
+    -----
+    Points enter the tree in lexicographic order, so the classes do not depend on the order in
+    which points are given.
+
+    Raises
+    ------
+    BadInput
+        Unknown linkage or naming rule, a number of clusters below 1, a depth that is not positive.
+    ValueError
+        A DONE point whose triplet is not finite.
+    """
+    _check(linkage, cuts, depth)
+    base_size = naming.base_size(names)
+    points = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
+    clustered = np.flatnonzero(np.asarray(status) == Status.DONE)
+    if not np.isfinite(points[clustered]).all():
+        raise ValueError("a point with status DONE has a triplet that is not finite")
+    scaler = tree.limits(points[clustered])
+    scaled = tree.scale(points[clustered], scaler)
+    if known is None:
+        leaves = _sample(scaled, largest_tree or LARGEST_TREE[linkage])
+        grown = tree.grow(scaled[leaves], linkage)
+    else:
+        grown, leaves = known[0], np.searchsorted(clustered, known[1])
+    nearest = _nearest_leaf(scaled, leaves)
+    maker = _CutMaker(points, clustered, grown, nearest, names, base_size)
+    wanted = {int(k): maker.make(int(k)) for k in cuts}
+    if depth is not None:
+        wanted[tree.clusters_at(grown, depth)] = maker.make(tree.clusters_at(grown, depth), depth)
+    return Classification(
+        method=linkage,
+        linkage=grown,
+        members=clustered[leaves],
+        scaler=scaler,
+        scaled=scaled[leaves],
+        cuts=dict(sorted(wanted.items())),
+        base=maker.make(base_size),
+        depth=depth,
+        sampled=len(leaves) < len(clustered),
+    )
+
+
+def _check(linkage: str, cuts: Sequence[int], depth: float | None) -> None:
+    if linkage not in tree.LINKAGES:
+        raise BadInput(f"reduction.linkage is {linkage!r}; allowed: {', '.join(tree.LINKAGES)}")
+    if any(k < 1 for k in cuts):
+        raise BadInput(f"reduction.cuts is {list(cuts)}; numbers of clusters start at 1")
+    if depth is not None and not depth > 0.0:
+        raise BadInput(f"reduction.depth is {depth}; it must be above 0")
+
+
+def _sample(scaled: Floats, largest: int) -> Integers:
+    """Return the rows that enter the tree, in an order that depends on their values only."""
+    order = np.lexsort(scaled.T[::-1])
+    if len(order) <= largest:
+        return order.astype(np.int64)
+    boxes = np.minimum((scaled[order] * _BINS).astype(np.int64), _BINS - 1)
+    box = boxes @ np.array([_BINS * _BINS, _BINS, 1])
+    by_box = np.argsort(box, kind="stable")
+    steps = (np.arange(largest) + 0.5) * (len(order) / largest)
+    first_of_box = np.unique(box[by_box], return_index=True)[1]
+    chosen = by_box[np.union1d(steps.astype(np.int64), first_of_box)]
+    return order[np.sort(chosen)].astype(np.int64)
+
+
+def _nearest_leaf(scaled: Floats, leaves: Integers) -> Integers:
+    """Return for each row the leaf that it is, or else the one nearest to it."""
+    position = np.full(len(scaled), -1, dtype=np.int64)
+    position[leaves] = np.arange(len(leaves))
+    missing = np.flatnonzero(position < 0)
+    if len(missing):
+        position[missing] = cKDTree(scaled[leaves]).query(scaled[missing])[1]
+    return position
+
+
+@dataclass(frozen=True)
+class _CutMaker:
+    """Turns cuts of the tree into named cuts of all points."""
+
+    points: Floats
+    clustered: Integers
+    tree: Floats
+    nearest: Integers
+    rule: naming.Rule
+    base_size: int
+
+    def make(self, n_clusters: int, depth: float | None = None) -> Cut:
+        labels = np.full(len(self.points), -1, dtype=np.int64)
+        if len(self.clustered) == 0:
+            empty = np.empty((0, 3))
+            return Cut(labels, (), (), empty, np.empty(0, dtype=np.int64), depth or 0.0)
+        raw = self._labels(n_clusters)
+        centroids, sizes = self._centroids(raw)
+        families, names, order = self._names(raw, centroids)
+        rank = np.argsort(order)
+        labels[self.clustered] = rank[raw]
+        height = tree.middle_height(self.tree, n_clusters) if depth is None else depth
+        return Cut(
+            labels=labels,
+            names=tuple(names[i] for i in order),
+            families=tuple(families[i] for i in order),
+            centroids=centroids[order],
+            sizes=sizes[order],
+            depth=height,
+        )
+
+    def _labels(self, n_clusters: int) -> Integers:
+        return tree.cut(self.tree, n_clusters)[self.nearest]
+
+    def _centroids(self, labels: Integers) -> tuple[Floats, Integers]:
+        sizes = np.bincount(labels)
+        sums = [np.bincount(labels, weights=column) for column in self.points[self.clustered].T]
+        return np.stack(sums, axis=1) / sizes[:, None], sizes.astype(np.int64)
+
+    def _names(self, labels: Integers, centroids: Floats) -> tuple[list[str], list[str], Integers]:
+        base_labels = self._labels(self.base_size)
+        base_names = naming.name_base(self._centroids(base_labels)[0], self.rule)
+        families = naming.inherit(base_labels, base_names, labels)
+        names = naming.add_suffixes(families, centroids)
+        known = list(naming.CLASSES if isinstance(self.rule, str) else self.rule)
+        keys = [(known.index(family), name) for family, name in zip(families, names, strict=True)]
+        order = sorted(range(len(names)), key=lambda i: (keys[i][0], len(keys[i][1]), keys[i][1]))
+        return families, names, np.array(order, dtype=np.int64)

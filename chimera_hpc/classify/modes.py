@@ -1,0 +1,110 @@
+"""The modal class of each cell (paper, ssec:classific: the statistical mode over the seeds)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import Cut
+from chimera_hpc.classify.naming import NO_WINDOW as NO_WINDOW
+from chimera_hpc.classify.naming import STEADY as STEADY
+from chimera_hpc.classify.tree import Floats, Integers
+
+
+class CellTable(Protocol):
+    """What is asked of a list of points."""
+
+    def cells(self) -> tuple[NDArray[np.int64], Mapping[str, NDArray[Any]]]:
+        """Return the cell of each point (n,) and the columns that name the cells (n_cells,)."""
+        ...
+
+
+def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[str, Any]]:
+    """Describe each cell by its coordinates and by ``class``, ``votes`` and ``entropy_bits``.
+
+    Every run with a result has one vote: its class, ``steady``, or ``no_window`` (it moves, but
+    too slowly to be classified). The modal class is taken over the classified runs; ties go to the
+    class with more members in the whole cut, then to the first in its order. A cell whose runs are
+    all steady or without a window is ``steady``; a cell without any result has class None and no
+    votes. The entropy -sum p log2 p is that of the votes.
+    """
+    cell_of_point, columns = points.cells()
+    n_cells = max((len(column) for column in columns.values()), default=0)
+    names = [*cut.names, STEADY, NO_WINDOW]
+    votes = count_votes(cell_of_point, vote_labels(cut.labels, status, len(cut.names)), n_cells)
+    votes = np.pad(votes, ((0, 0), (0, len(names) - votes.shape[1])))
+    modal = modal_labels(votes[:, : len(cut.names)], cut.sizes)
+    entropy = entropy_bits(votes)
+    found = []
+    for i in range(n_cells):
+        cell: dict[str, Any] = {name: column[i].item() for name, column in columns.items()}
+        cell["class"] = names[modal[i]] if modal[i] >= 0 else (STEADY if votes[i].any() else None)
+        cell["votes"] = {names[j]: int(votes[i, j]) for j in np.flatnonzero(votes[i])}
+        cell["entropy_bits"] = float(entropy[i])
+        found.append(cell)
+    return found
+
+
+def vote_labels(labels: Integers, status: ArrayLike, n_classes: int) -> Integers:
+    """Extend labels: `n_classes` for steady runs, one more for no window, -1 for no result."""
+    state = np.asarray(status)
+    vote = np.where(state == Status.DONE, labels, -1)
+    vote[state == Status.STEADY] = n_classes
+    vote[state == Status.NO_WINDOW] = n_classes + 1
+    return vote
+
+
+def count_votes(cell_of_point: Integers, labels: Integers, n_cells: int) -> Integers:
+    """Count labels per cell: (n_cells, largest label + 1); negative labels do not count."""
+    valid = labels >= 0
+    counts = np.zeros((n_cells, int(labels.max(initial=-1)) + 1), dtype=np.int64)
+    np.add.at(counts, (cell_of_point[valid], labels[valid]), 1)
+    return counts
+
+
+def modal_labels(votes: Integers, sizes: Integers) -> Integers:
+    """Return the most frequent class of each row of `votes` (n_cells, k), -1 for an empty row.
+
+    Ties go to the class with the larger `sizes` (k,), then to the smaller label.
+    """
+    if votes.shape[1] == 0:
+        return np.full(len(votes), -1, dtype=np.int64)
+    leading = votes == votes.max(axis=1, keepdims=True)
+    modal = np.where(leading, sizes, -1).argmax(axis=1)
+    return np.where(votes.any(axis=1), modal, -1)
+
+
+def entropy_bits(votes: Integers) -> Floats:
+    """Return the entropy -sum p log2 p of each row of counts, in bits; 0 for an empty row."""
+    total = votes.sum(axis=1, keepdims=True)
+    share = votes / np.maximum(total, 1)
+    terms = share * np.log2(share, where=share > 0.0, out=np.zeros_like(share))
+    entropy: Floats = np.abs(terms.sum(axis=1))
+    return entropy
+
+
+def run_names(labels: Integers, status: ArrayLike, names: Sequence[str]) -> list[str | None]:
+    """Name the class of every run: its class, ``steady``, ``no_window``, or None without result."""
+    every: list[str | None] = [*names, STEADY, NO_WINDOW, None]
+    return [every[vote] for vote in vote_labels(labels, status, len(names))]
+
+
+def class_for_comparison(cell: Mapping[str, Any], cut: Cut) -> str | None:
+    """Return a cell's modal base class when steady votes count as ordered, as the paper has it.
+
+    Sub-classes count for their base class; ties go to the larger total membership.
+    """
+    family_of = dict(zip(cut.names, cut.families, strict=True)) | {STEADY: "ordered"}
+    votes: dict[str, int] = {}
+    for name, count in cell["votes"].items():
+        if name in family_of:
+            votes[family_of[name]] = votes.get(family_of[name], 0) + count
+    size = {family: 0 for family in votes}
+    for family, members in zip(cut.families, cut.sizes, strict=True):
+        if family in size:
+            size[family] += int(members)
+    return max(votes, key=lambda family: (votes[family], size[family]), default=None)

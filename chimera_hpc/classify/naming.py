@@ -1,0 +1,87 @@
+"""Names of clusters: a rule for the base cut, inheritance along the tree for all others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.classify.tree import Floats, Integers
+
+CLASSES = ("ordered", "chimera", "disordered")
+STEADY, NO_WINDOW = "steady", "no_window"
+RESERVED = frozenset({STEADY, NO_WINDOW})
+Rule = str | Sequence[str]
+
+
+def base_size(rule: Rule) -> int:
+    """Return the number of clusters of the base cut, the one that `rule` names directly.
+
+    Raises
+    ------
+    BadInput
+        For an unknown rule, or a list of names that is empty, repeats one, or holds a reserved one.
+    """
+    if isinstance(rule, str):
+        if rule != "triplet":
+            raise BadInput(f"reduction.names is {rule!r}; allowed: 'triplet' or a list of names")
+        return len(CLASSES)
+    if not rule or len(set(rule)) != len(rule):
+        raise BadInput(f"reduction.names is {list(rule)}; a list of names must be different names")
+    if taken := sorted(RESERVED & set(rule)):
+        raise BadInput(f"reduction.names holds {taken[0]!r}, which names runs outside all classes")
+    return len(rule)
+
+
+def name_base(centroids: Floats, rule: Rule) -> list[str]:
+    """Name the clusters of the base cut by their centroids (k, 3) in (V_theta, V_a, V_Omega).
+
+    ``"triplet"``: of three clusters, chimera has the largest V_Omega; of the other two, ordered has
+    the smaller V_theta. With only two clusters (two different points in all), ordered has the
+    smaller V_theta, and the other is a chimera if its V_Omega is the larger, else disordered; a
+    single cluster is ordered. A list of names goes to the clusters by rising V_theta, from its
+    start when there are fewer clusters than names.
+    """
+    by_phase = [int(i) for i in np.argsort(centroids[:, 0], kind="stable")]
+    names = [""] * len(centroids)
+    if not isinstance(rule, str):
+        for name, cluster in zip(rule, by_phase, strict=False):
+            names[cluster] = name
+        return names
+    if len(centroids) == 3:
+        chimera = int(np.argmax(centroids[:, 2]))
+        by_phase.remove(chimera)
+        names[chimera] = "chimera"
+    for name, cluster in zip(("ordered", "disordered"), by_phase, strict=False):
+        names[cluster] = name
+    if len(centroids) == 2 and np.argmax(centroids[:, 2]) == by_phase[1]:
+        names[by_phase[1]] = "chimera"
+    return names
+
+
+def inherit(base_labels: Integers, base_names: Sequence[str], labels: Integers) -> list[str]:
+    """Return the family of each cluster in `labels`: the base class that holds most of its members.
+
+    A finer cluster lies wholly inside one base class. A coarser one is a union of base classes and
+    takes the name of the largest of them, so names stay different.
+    """
+    counts = np.zeros((labels.max() + 1, len(base_names)), dtype=np.int64)
+    np.add.at(counts, (labels, base_labels), 1)
+    return [base_names[family] for family in counts.argmax(axis=1)]
+
+
+def add_suffixes(families: Sequence[str], centroids: Floats) -> list[str]:
+    """Append -1, -2, ... to families that hold several clusters, by falling V_a of the centroid.
+
+    Falling V_a is the order in which the paper numbers its sub-classes (fig:orient1_5classes:
+    weakly homogeneous before travelling wave, irregular before nearly equal amplitudes).
+    """
+    names = list(families)
+    for family in set(families):
+        clusters = [i for i, name in enumerate(families) if name == family]
+        if len(clusters) > 1:
+            clusters.sort(key=lambda i: (-centroids[i, 1], centroids[i, 0]))
+            for number, cluster in enumerate(clusters, start=1):
+                names[cluster] = f"{family}-{number}"
+    return names

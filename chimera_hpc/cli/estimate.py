@@ -1,0 +1,95 @@
+"""What a sweep would cost, and which ones are refused without ``--yes``."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.job import Sweep, block_size
+from chimera_hpc.job.blocks import point_seconds
+from chimera_hpc.store.schema import room
+
+MOST_FILES = 500_000
+MOST_CORE_HOURS = 100_000.0
+"""Beyond these a sweep is taken for a slip of the pen."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The size of a sweep."""
+
+    points: int
+    cells: int
+    axes: tuple[str, ...]
+    block: int
+    blocks: int
+    files: int
+    bytes: int
+    seconds: float
+    """Work on one core."""
+
+
+def estimate(sweep: Sweep) -> Estimate:
+    """Return what a sweep would take, computed from its points as columns."""
+    points = sweep.points()
+    size = block_size(sweep, len(points))
+    need = room(sweep, points.columns, size)
+    cells = len(points.cells()[1]["delta"])
+    seconds = point_seconds(sweep) * len(points)
+    return Estimate(
+        *(len(points), cells, points.axes, size, need.blocks, need.files, need.bytes, seconds)
+    )
+
+
+def refuse_absurd(sweep: Sweep, need: Estimate, folder: Path, yes: bool) -> None:
+    """Raise BadInput when a sweep of this size in this folder is absurd, unless `yes`."""
+    reasons = _absurdities(need, folder)
+    if reasons and not yes:
+        raise BadInput(f"{sweep.name}: {'; '.join(reasons)}; --yes if that is meant")
+
+
+def _absurdities(need: Estimate, folder: Path) -> list[str]:
+    reasons = []
+    if need.files > MOST_FILES:
+        reasons.append(f"{need.files} files are more than {MOST_FILES} (larger blocks make fewer)")
+    hours = need.seconds / 3600
+    if hours > MOST_CORE_HOURS:
+        reasons.append(f"{hours:.3g} core-hours are more than {MOST_CORE_HOURS:.0f}")
+    free = free_bytes(folder)
+    if free is not None and need.bytes > free:
+        reasons.append(
+            f"{in_bytes(need.bytes)} may be needed, {in_bytes(free)} are free "
+            f"(keep.series = none or first-seed takes less)"
+        )
+    return reasons
+
+
+def free_bytes(folder: Path) -> int | None:
+    """Return the bytes that are free where the folder is, or would be; None when unknown."""
+    for place in (folder, *folder.absolute().parents):
+        if place.is_dir():
+            try:
+                return shutil.disk_usage(place).free
+            except OSError:
+                return None
+    return None
+
+
+def in_bytes(size: float) -> str:
+    """Write a number of bytes for people."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"
+
+
+def in_time(seconds: float) -> str:
+    """Write a duration for people."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.3g} h"

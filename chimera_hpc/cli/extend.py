@@ -1,0 +1,54 @@
+"""``extend``: more seeds, new values on any axis; finished points stay as they are."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.cli.arguments import (
+    add_job,
+    add_out,
+    add_yes,
+    load_job,
+    store_path,
+    sweep_folder,
+)
+from chimera_hpc.cli.estimate import estimate, refuse_absurd
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep extend jobs/quickstart.toml --set seeds=40
+  python -m chimera_hpc.sweep extend jobs/quickstart.toml --set P=2:30 --out results/quickstart
+
+The job, with what is set, must hold all points of the sweep and may differ in its axes only. The
+new points stand behind the old ones, which are not touched; `run`, with the old job or the new one,
+computes them.
+"""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_job(parser)
+    add_out(parser)
+    add_yes(parser)
+
+
+def execute(args: Namespace) -> int:
+    """Extend the store of a sweep."""
+    sweep = load_job(args.job, args.overrides)
+    folder = sweep_folder(args.out, sweep)
+    path = store_path(folder)
+    refuse_absurd(sweep, estimate(sweep), folder, args.yes)
+    from chimera_hpc.store.store import Store
+
+    try:
+        before = Store.open(path)
+        after = before.extend(sweep)
+    except OSError as error:
+        where = error.filename or path
+        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
+    more = after.n_points - before.n_points
+    print(f"{more} points added, {after.n_points} in all, in {after.n_blocks} blocks")
+    if more:
+        print(f"to compute them: run {args.job} --out {folder}")
+    return Exit.COMPLETE

@@ -1,0 +1,103 @@
+"""The command line: ``python -m chimera_hpc.sweep COMMAND ...``."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from typing import NoReturn
+
+from chimera_hpc import __version__
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.run.fork_server import fork_server
+
+_EXITS = """exit status:
+  0 every point has a result; 1 some failed (listed); 2 bad input (one line);
+  75 stopped in good order with more to do; 130 Ctrl-C
+"""
+
+_OBJECTS = 50_000
+"""New objects after which Python looks for garbage."""
+_WORKING, _LOCAL = ("run", "retry"), "local"
+"""The commands that may start workers, and where they do without being told."""
+_INTERRUPTED = 130
+
+
+def parser(
+    program: str = "python -m chimera_hpc.sweep", typed: Sequence[str] | None = None
+) -> ArgumentParser:
+    """Return the parser of the whole command line, called by this name.
+
+    It knows the arguments of all commands, or where `typed` is given only of those that are named
+    in it: the others need not be loaded then.
+    """
+    from chimera_hpc.cli import COMMANDS
+
+    top = ArgumentParser(
+        prog=program,
+        description="Parameter sweeps of oscillator networks: integrate, store, classify, draw.",
+        epilog="Each command has its own --help with examples.\n\n" + _EXITS,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action="version", version=f"chimera_hpc {__version__}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for command in COMMANDS:
+        sub = commands.add_parser(command.name, help=command.help)
+        if typed is None or command.name in typed:
+            sub.description = command.help[0].upper() + command.help[1:] + "."
+            sub.epilog = command.module.EPILOG + "\n" + _EXITS
+            sub.formatter_class = RawDescriptionHelpFormatter
+            command.module.add_arguments(sub)
+            sub.set_defaults(execute=command.module.execute)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
+    # Most of what a command imports is no garbage: looking for some takes a tenth of a second.
+    gc.set_threshold(_OBJECTS)
+    typed = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        # The workers get ready while the commands are imported.
+        with fork_server(needs_workers(typed)):
+            return _execute(typed)
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def needs_workers(typed: Sequence[str]) -> bool:
+    """Return whether a command line is going to start a local cluster, as far as one sees."""
+    if not typed or typed[0] not in _WORKING or not {"-h", "--help"}.isdisjoint(typed):
+        return False
+    # The last one counts, as for the parser: `--cluster NAME` or `--cluster=NAME`, or shortened.
+    place = _LOCAL
+    for word, following in zip(typed, [*typed[1:], ""], strict=True):
+        name, _, given = word.partition("=")
+        if name.startswith("--c") and "--cluster".startswith(name):
+            place = given or following
+    return place == _LOCAL
+
+
+def _execute(typed: list[str]) -> int:
+    from chimera_hpc.base.exits import Exit
+
+    args = parser(typed=typed).parse_args(typed)
+    args.typed = typed
+    args.parser_named = parser
+    try:
+        return int(args.execute(args))
+    except BadInput as error:
+        print(f"error: {error}", file=sys.stderr)
+        return Exit.BAD_INPUT
+    except BrokenPipeError:
+        sys.stderr.close()
+        return Exit.COMPLETE
+
+
+def run() -> NoReturn:
+    """Run the command line and leave with its exit status."""
+    status = main()
+    # Nor is it when Python ends, which would look through it once more.
+    gc.freeze()
+    sys.exit(status)

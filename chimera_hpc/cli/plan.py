@@ -1,0 +1,48 @@
+"""``plan``: what a sweep would cost; starts nothing."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.cli.arguments import (
+    add_block,
+    add_job,
+    add_out,
+    add_yes,
+    load_job,
+    sweep_folder,
+)
+from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, refuse_absurd
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep plan jobs/quickstart.toml
+  python -m chimera_hpc.sweep plan jobs/quickstart.toml --set seeds=100 --set keep.series=none
+
+A plan of more files than 500,000, of more core-hours than 100,000, or of more bytes than are free
+where it would be stored is refused with exit status 2, by `run` too; --yes accepts it.
+"""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_job(parser)
+    add_out(parser)
+    add_block(parser)
+    add_yes(parser)
+
+
+def execute(args: Namespace) -> int:
+    """Print the plan."""
+    sweep = load_job(args.job, args.overrides, args.block)
+    folder = sweep_folder(args.out, sweep)
+    need = estimate(sweep)
+    print(f"sweep       {sweep.name} ({sweep.model}), digest {sweep.digest}")
+    print(f"axes        {', '.join(need.axes)}")
+    print(f"points      {need.points} in {need.cells} cells")
+    print(f"blocks      {need.blocks} of up to {need.block} points")
+    print(f"files       {need.files}")
+    print(f"store       {in_bytes(need.bytes)} at most")
+    print(f"work        about {in_time(need.seconds)} on one core")
+    refuse_absurd(sweep, need, folder, args.yes)
+    return Exit.COMPLETE

@@ -1,0 +1,45 @@
+"""``reduce``: classes, curves, results.json and figures from what is in the store."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.base.status import Status
+from chimera_hpc.cli.arguments import STORE, add_folder, store_path
+from chimera_hpc.cli.reporting import reduce_and_report
+from chimera_hpc.store.ledger import read_ledger
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep reduce results/quickstart
+"""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_folder(parser)
+    parser.add_argument("--no-figures", action="store_true", help="results.json only")
+    parser.add_argument(
+        "--complete", action="store_true", help="only if every point was tried; else exit status 75"
+    )
+
+
+def execute(args: Namespace) -> int:
+    """Reduce the sweep in a folder, finished or not."""
+    folder = store_path(args.folder).parent
+    if args.complete:
+        left = int((read_ledger(folder / STORE)["status"] == Status.NEVER).sum())
+        if left:
+            print(f"{folder}: {left} points are left to compute; nothing reduced")
+            return Exit.MORE_TO_DO
+    from chimera_hpc.store.blocks import DamagedChunk
+
+    try:
+        reduce_and_report(folder, make_figures=not args.no_figures)
+    except DamagedChunk as error:
+        raise BadInput(f"{args.folder}: {error}") from None
+    except OSError as error:
+        where = error.filename or args.folder
+        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
+    return Exit.COMPLETE

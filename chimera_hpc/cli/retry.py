@@ -1,0 +1,107 @@
+"""``retry``: compute failed points once more."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.cli.arguments import (
+    add_folder,
+    add_overrides,
+    add_place,
+    add_reduction,
+    place_of,
+    store_path,
+)
+from chimera_hpc.cli.ending import end, interrupted
+from chimera_hpc.cli.reporting import load_reduction
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.reading import apply_overrides
+from chimera_hpc.run.driver import Driver
+from chimera_hpc.run.signals import stop_request
+from chimera_hpc.store.ledger import NO_LIMIT
+
+if TYPE_CHECKING:
+    from chimera_hpc.store.store import Store
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep retry results/quickstart
+  python -m chimera_hpc.sweep retry results/quickstart --status time_out --time-out 7200
+  python -m chimera_hpc.sweep retry results/quickstart --status non_finite,step_too_small \\
+      --set run.attempts=5 --set run.tighten=0.01
+
+Statuses: non_finite, step_too_small, step_budget, time_out, worker_lost, out_of_memory. Each failed
+point is computed once; what fails again stays failed, results are never touched. --time-out and
+--max-steps hold for this run in place of the sweep's own limits: they decide how far a point gets,
+not its numbers.
+"""
+_FAILURES = {code.name.lower(): code for code in Status if code.is_failure}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_folder(parser)
+    parser.add_argument(
+        "--status",
+        metavar="NAME[,NAME]",
+        help="only points that failed in these ways (default: all failed points)",
+    )
+    parser.add_argument("--time-out", type=float, metavar="S", help="seconds of wall time a point")
+    parser.add_argument("--max-steps", type=int, metavar="N", help="steps a point")
+    add_overrides(parser)
+    add_place(parser)
+    add_reduction(parser)
+
+
+def execute(args: Namespace) -> int:
+    """Try the failed points of a sweep again."""
+    statuses = statuses_of(args.status)
+    for name in ("time_out", "max_steps"):
+        value = getattr(args, name)
+        if value is not None and not value > 0:
+            raise BadInput(f"--{name.replace('_', '-')} {value}: must be above 0")
+    with stop_request() as stop:
+        try:
+            path = store_path(args.folder)
+            from chimera_hpc.run.messages import Again
+
+            store = _store(path, args.overrides)
+            again = Again(
+                attempts=NO_LIMIT,
+                statuses=statuses,
+                earlier_only=True,
+                time_out=args.time_out,
+                max_steps=args.max_steps,
+            )
+            place = place_of(args, store.sweep, path)
+            driver = Driver(store, place, stop, path.parent / "run.log", again, args.strict)
+            driver.meanwhile = load_reduction
+            driver.work()
+            return end(driver, path.parent, args)
+        except KeyboardInterrupt:
+            return interrupted(stop, args)
+
+
+def statuses_of(text: str | None) -> tuple[Status, ...]:
+    """Return the failures that a list of names means; all of them without a list."""
+    if text is None:
+        return tuple(_FAILURES.values())
+    names = [name.strip().lower() for name in text.split(",")]
+    for name in names:
+        if name not in _FAILURES:
+            raise BadInput(f"--status: {short(name)} is no failure{nearest(name, [*_FAILURES])}")
+    return tuple(_FAILURES[name] for name in names)
+
+
+def _store(path: Path, overrides: list[str]) -> Store:
+    from chimera_hpc.store.store import Store
+
+    store = Store.open(path)
+    if not overrides:
+        return store
+    sweep = Sweep.from_dict(apply_overrides(store.sweep.to_dict(), overrides), where=str(path))
+    return store.adopt(sweep)

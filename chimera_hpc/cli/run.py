@@ -1,0 +1,100 @@
+"""``run``: plan a sweep or go on with it, compute what is missing, reduce."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.cli.arguments import (
+    STORE,
+    add_block,
+    add_job,
+    add_out,
+    add_place,
+    add_reduction,
+    add_resubmit,
+    add_slurm,
+    add_yes,
+    load_job,
+    place_of,
+    sweep_folder,
+)
+from chimera_hpc.cli.ending import end, interrupted
+from chimera_hpc.cli.estimate import estimate, refuse_absurd
+from chimera_hpc.cli.reporting import LiveReport, load_reduction
+from chimera_hpc.cli.resubmitting import go_on
+from chimera_hpc.job import Sweep
+from chimera_hpc.run.driver import Driver
+from chimera_hpc.run.signals import stop_request
+
+if TYPE_CHECKING:
+    from chimera_hpc.store.store import Store
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep run jobs/quickstart.toml
+  python -m chimera_hpc.sweep run jobs/quickstart.toml --workers 4 --out /scratch/me/quick
+  python -m chimera_hpc.sweep run jobs/quickstart.toml --set P=10:14 --set seeds=100 --out more
+
+The same command again goes on where the sweep stopped, however it stopped. Points that ran out of
+time or memory are tried run.attempts times in all; `retry` tries failed points once more.
+"""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_job(parser)
+    add_out(parser)
+    add_place(parser)
+    add_slurm(parser)
+    add_resubmit(parser)
+    add_block(parser)
+    add_reduction(parser)
+    add_yes(parser)
+
+
+def execute(args: Namespace) -> int:
+    """Run the sweep of a job file."""
+    with stop_request() as stop:
+        try:
+            sweep = load_job(args.job, args.overrides, args.block)
+            folder = sweep_folder(args.out, sweep)
+            place = place_of(args, sweep, folder / STORE)
+            store = open_or_plan(folder, sweep, args.yes)
+            from chimera_hpc.run.messages import Again
+
+            again = Again(attempts=sweep.run.attempts)
+            driver = Driver(store, place, stop, folder / "run.log", again, args.strict)
+            driver.meanwhile = load_reduction
+            if not args.no_figures:
+                driver.report = LiveReport(folder, store.n_points)
+            driver.work()
+            return go_on(end(driver, folder, args), driver, args.resubmit)
+        except KeyboardInterrupt:
+            return interrupted(stop, args)
+
+
+def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
+    """Return the store in ``folder`` for this sweep: a new one, or the one to go on with."""
+    path = folder / STORE
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"{folder}: not a folder")
+    try:
+        exists = path.exists()
+        if not exists:
+            refuse_absurd(sweep, estimate(sweep), folder, yes)
+        from chimera_hpc.store.store import Store
+
+        if exists:
+            return Store.open(path).adopt(sweep)
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            return Store.plan(path, sweep)
+        except BadInput:
+            if not path.exists():
+                raise
+            # Another driver planned it in this very moment.
+            return Store.open(path).adopt(sweep)
+    except OSError as error:
+        raise BadInput(f"{folder}: can't be written: {error.strerror or error}") from None

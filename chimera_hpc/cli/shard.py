@@ -1,0 +1,124 @@
+"""``shard``: compute one share of a sweep's blocks, as an element of a job array does."""
+
+from __future__ import annotations
+
+import os
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.cli.arguments import (
+    add_out,
+    add_overrides,
+    add_resubmit,
+    load_job,
+    store_path,
+    sweep_folder,
+)
+from chimera_hpc.cli.resubmitting import go_on
+from chimera_hpc.cli.run import open_or_plan
+from chimera_hpc.run.driver import Driver, Place
+from chimera_hpc.run.signals import stop_request
+from chimera_hpc.store.ledger import FAILED
+
+if TYPE_CHECKING:
+    from chimera_hpc.store.store import Store
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep shard results/quickstart --of 16              in a job array
+  python -m chimera_hpc.sweep shard results/quickstart --of 16 --index 3
+  python -m chimera_hpc.sweep shard jobs/quickstart.toml --of 16            plans the store, too
+
+Share i of n has the blocks i, i + n, i + 2n, ...; shares need nothing from each other, and any of
+them may be repeated. Inside of a job array --index is SLURM_ARRAY_TASK_ID.
+"""
+_ELEMENT = "SLURM_ARRAY_TASK_ID"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument(
+        "folder", type=Path, metavar="DIR", help="the sweep's folder, or a job file"
+    )
+    parser.add_argument("--of", type=int, required=True, metavar="N", help="number of shares")
+    parser.add_argument("--index", type=int, metavar="I", help="which share, from 0")
+    add_overrides(parser)
+    add_out(parser)
+    add_resubmit(parser)
+
+
+def execute(args: Namespace) -> int:
+    """Compute one share."""
+    share = share_of(args.index, args.of)
+    with stop_request() as stop:
+        try:
+            from chimera_hpc.run.messages import Again
+            from chimera_hpc.store.store import Store
+
+            path = _store_path(args.folder, args.out, args.overrides)
+            store = Store.open(path)
+            log = path.parent / "slurm" / f"shard-{share[0]}.log"
+            log.parent.mkdir(exist_ok=True)
+            again = Again(attempts=store.sweep.run.attempts)
+            driver = Driver(store, Place("serial", share=share), stop, log, again)
+            driver.work()
+            return go_on(_end(driver), driver, args.resubmit)
+        except KeyboardInterrupt:
+            if not stop():
+                raise
+            return stop.exit_status
+
+
+def share_of(index: int | None, of: int) -> tuple[int, int]:
+    """Return which share of how many; without an index, the one that the job array tells.
+
+    An element's number is its share, so that any part of an array can be submitted again.
+    """
+    if index is None:
+        element = os.environ.get(_ELEMENT, "")
+        if not element.isdecimal():
+            raise BadInput("--index: needed outside of a SLURM job array")
+        index = int(element)
+    if of < 1 or not 0 <= index < of:
+        raise BadInput(f"share {index} of {of}: allowed are --of 1 or more and --index 0 to of - 1")
+    return index, of
+
+
+def _store_path(folder: Path, out: Path | None, overrides: list[str]) -> Path:
+    """Return the store of a folder, or of a job file, which is planned by the first who comes."""
+    if not folder.is_file():
+        if overrides:
+            raise BadInput(f"--set: {folder} is planned already; it goes with a job file only")
+        return store_path(folder.absolute())
+    sweep = load_job(folder, overrides)
+    place = sweep_folder(out, sweep)
+    try:
+        return open_or_plan(place, sweep, yes=False).path
+    except BadInput:
+        # Another element may have planned it in this very moment.
+        return open_or_plan(place, sweep, yes=False).path
+
+
+def _failed_points(store: Store, index: int, of: int) -> int:
+    codes = store.ledger()["status"]
+    mine = np.arange(len(codes)) // store.block_size % of == index
+    return int(np.isin(codes[mine], FAILED).sum())
+
+
+def _end(driver: Driver) -> int:
+    """Say how the share went, and return the exit status."""
+    left = driver.pending()
+    index, of = driver.place.share or (0, 1)
+    name = f"share {index} of {of}"
+    if driver.ended_by or (driver.stop() and left):
+        print(f"{name}: stopped with {len(left)} blocks left: {driver.ended_by or 'as asked'}")
+        return Exit.MORE_TO_DO if driver.ended_by else driver.stop.exit_status
+    for block, trouble in driver.broken.items():
+        print(f"block {block} could not be done: {trouble.text} (more in {driver.log})")
+    failed = _failed_points(driver.store, index, of)
+    print(f"{name}: done" + (f", {failed} points failed" if failed else ""))
+    return Exit.FAILURES if failed or driver.broken else Exit.COMPLETE

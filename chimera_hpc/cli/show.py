@@ -1,0 +1,218 @@
+"""``show``: a point, or a cell, computed anew and drawn."""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.cli.arguments import add_folder, add_point, find_points, store_path
+from chimera_hpc.cli.ending import name_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chimera_hpc.reduction.replay import Replay
+    from chimera_hpc.store.store import Store
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep show results/quickstart P=12 Q=12 seed=3
+  python -m chimera_hpc.sweep show results/quickstart P=12 --node 20 --window 2
+  python -m chimera_hpc.sweep show results/quickstart P=12 seed=3 --animate ring.gif
+
+The run is integrated anew by the code that made the sweep, and what comes out is compared with the
+store bit for bit; exit status 1: it comes out otherwise. Values that select one cell and no seed
+show its seeds side by side, and the portrait and spectrum of the one that stands for them: of the
+most frequent class, nearest to the median of its variations. Nodes and windows count from 0 here,
+as features.clock_node does, and from 1 in figures.
+"""
+_SIDE_BY_SIDE = 6
+"""Most seeds of a cell that are drawn."""
+_CLOSE_UP = 12.0
+"""Periods in the close-up of the space-time plot."""
+_FRAMES_A_PERIOD = 25
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_folder(parser)
+    add_point(parser)
+    parser.add_argument(
+        "--node", type=int, metavar="J", help="node of portrait and spectrum (default: the clock's)"
+    )
+    parser.add_argument(
+        "--window", type=int, default=0, metavar="K", help="window of the spectrum (default: 0)"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="where figures go (default: figures/show)"
+    )
+    parser.add_argument(
+        "--animate", type=Path, metavar="FILE", help="write the ring's motion, .gif or .mp4"
+    )
+    parser.add_argument(
+        "--periods", type=float, default=5.0, metavar="N", help="periods of it (default: 5)"
+    )
+
+
+def execute(args: Namespace) -> int:
+    """Replay and draw."""
+    path = store_path(args.folder)
+    if not 0.0 < args.periods <= 1000.0:
+        raise BadInput(f"--periods {args.periods}: a number above 0, up to 1000, is needed")
+    from chimera_hpc.store.store import Store
+
+    store = Store.open(path)
+    chosen = find_points(store, args.point)
+    node = store.sweep.features.clock_node if args.node is None else args.node
+    if not 0 <= node < store.sweep.n_nodes:
+        raise BadInput(f"--node {node}: allowed is 0 to {store.sweep.n_nodes - 1}")
+    _one_cell(store, chosen)
+    from chimera_hpc.plot.animation import check_film
+    from chimera_hpc.reduction.replay import replay, representative
+
+    if args.animate is not None:
+        check_film(args.animate)
+    first = representative(store, chosen) if len(chosen) > 1 else chosen[0]
+    shown = sorted({first, *[i for i in chosen if i != first][: _SIDE_BY_SIDE - 1]})
+    runs = replay(store, shown)
+    for run in runs:
+        _tell(store, run)
+    if len(chosen) > len(runs):
+        print(f"{len(runs)} of {len(chosen)} seeds shown")
+    focus = next(run for run in runs if run.point == first)
+    if len(runs) > 1:
+        print(f"portrait and spectrum: {name_of(store, first)}")
+    folder = args.out or path.parent / "figures" / "show"
+    stem = _stem(store, first, len(runs) == 1)
+    for made in _draw(store, runs, focus, node, args.window, folder, stem):
+        print(f"written: {made}")
+    if args.animate is not None:
+        _animate(store, focus, args.animate, args.periods)
+    good = all(run.is_same or run.stored is None for run in runs)
+    return Exit.COMPLETE if good else Exit.FAILURES
+
+
+def _one_cell(store: Store, chosen: list[int]) -> None:
+    """Refuse points of several cells."""
+    mine = store.points[np.asarray(chosen)]
+    loose = {name: np.unique(column) for name, column in mine.columns.items() if name != "seed"}
+    loose = {name: values for name, values in loose.items() if len(values) > 1}
+    if loose:
+        cells = len(np.unique(store.points.cells()[0][chosen]))
+        some = ", ".join(
+            f"{name} ({', '.join(f'{x:g}' for x in values[:4])}{', ...' * (len(values) > 4)})"
+            for name, values in loose.items()
+        )
+        raise BadInput(f"point: these values are those of {cells} cells; say also {some}")
+
+
+def _tell(store: Store, run: Replay) -> None:
+    """Say what came out, and whether it is what is stored."""
+    words = [f"{name_of(store, run.point)}: {run.class_name or 'not classified yet'}"]
+    if np.isfinite(run.triplet).all():
+        labels = ("V_theta", "V_a", "V_Omega")
+        words += [f"{name} {x:.6g}" for name, x in zip(labels, run.triplet, strict=True)]
+    print(", ".join(words))
+    print(f"  {run.status.sentence}; {run.n_windows} windows")
+    digest = f"{run.digest & (2**64 - 1):016x}"
+    if run.stored is None:
+        print(f"  digest {digest}; the store holds no result of this point yet")
+    elif run.is_same:
+        print(f"  digest {digest}, as stored: the same bits")
+    else:
+        print(f"  digest {digest}, stored is {run.stored & (2**64 - 1):016x}: NOT the same")
+        for line in _why(store, run.point):
+            print(f"    {line}")
+
+
+def _why(store: Store, point: int) -> list[str]:
+    """Return what differs between now and the run that stored a point."""
+    from chimera_hpc.store.provenance import differences, gather, model_source
+    from chimera_hpc.store.runs import read_run
+
+    try:
+        before = read_run(store.path, int(store.ledger()["run"][point]))
+    except BadInput as error:
+        return [str(error)]
+    now = {**gather(), **model_source(store.sweep.model)}
+    return differences(before, now) or ["nothing known of differs; `verify` looks at the bytes"]
+
+
+def _stem(store: Store, point: int, with_seed: bool) -> str:
+    """Return how the files of a point are called: ``P12_Q12_seed3``."""
+    words = name_of(store, point).split()
+    if not with_seed:
+        words = [word for word in words if not word.startswith("seed=")]
+    return re.sub(r"[^\w.+-]", "", "_".join(words).replace("=", "")) or "cell"
+
+
+def _draw(
+    store: Store, runs: list[Replay], focus: Replay, node: int, window: int, folder: Path, stem: str
+) -> list[Path]:
+    """Draw all that there is to draw; returns the PNG files, each with a PDF beside it."""
+    from chimera_hpc.plot.indicators import fourier_indicators, profiles_of
+    from chimera_hpc.plot.portrait import ring_portrait
+    from chimera_hpc.plot.spacetime import space_time
+    from chimera_hpc.plot.spectrum import spectrum
+    from chimera_hpc.plot.style import save
+    from chimera_hpc.reduction.replay import has_nullcline, window_spectrum
+
+    figures: dict[str, Figure] = {}
+    seen = [run for run in runs if np.isfinite(run.u).any()]
+    if seen:
+        length = seen[0].t[-1] - seen[0].t[0]
+        slowest = np.nanmax([run.period for run in seen] + [0.0])
+        zoom = _CLOSE_UP * slowest if 0.0 < _CLOSE_UP * slowest < 0.5 * length else None
+        panels: list[Any] = [(run.t, run.u) for run in seen]
+        figures["space_time"] = space_time(panels, [run.title for run in seen], zoom=zoom)
+    measured = [run for run in runs if run.n_windows]
+    if measured:
+        titles = [f"{run.title}\n$V$ = ({_three(run.triplet)})" for run in measured]
+        figures["profiles"] = fourier_indicators(
+            [profiles_of(run.features) for run in measured], titles
+        )
+    if np.isfinite(focus.u).all():
+        figures["portrait"] = ring_portrait(
+            *(focus.t, focus.u, focus.w, node),
+            title=focus.title,
+            nullcline=has_nullcline(store.sweep),
+            period=focus.period,
+        )
+    if focus.n_windows:
+        settings = store.sweep.features
+        data, text = window_spectrum(focus.t, focus.u, settings, node, window)
+        print(text)
+        figures["spectrum"] = spectrum(data, f"node {node + 1}, window {window + 1}")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]
+    except OSError as error:
+        raise BadInput(f"{folder}: can't be written: {error.strerror or error}") from None
+
+
+def _three(triplet: Any) -> str:
+    return ", ".join(f"{value:.3f}" for value in triplet)
+
+
+def _animate(store: Store, run: Replay, path: Path, periods: float) -> None:
+    """Write the last periods of a run as a film."""
+    from chimera_hpc.plot.animation import animate_ring
+    from chimera_hpc.reduction.replay import has_nullcline
+
+    if not np.isfinite(run.u).all():
+        raise BadInput(f"--animate: {run.status.sentence}: there is nothing to show")
+    length = run.t[-1] - run.t[0]
+    duration = min(periods * run.period, length) if run.period > 0.0 else 0.1 * length
+    step = run.t[1] - run.t[0]
+    frame = max(1, round(duration / (periods * _FRAMES_A_PERIOD) / step))
+    first = int(np.searchsorted(run.t, run.t[-1] - duration))
+    part = slice(first, None, frame)
+    title = ", ".join(run.title.split("\n"))
+    nullcline = has_nullcline(store.sweep)
+    animate_ring(path, run.t[part], run.u[part], run.w[part], title=title, nullcline=nullcline)
+    print(f"written: {path}")

@@ -1,0 +1,141 @@
+"""``slurm``: batch scripts for a sweep, printed or submitted."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.base.files import write_atomically
+from chimera_hpc.cli.arguments import (
+    STORE,
+    add_block,
+    add_job,
+    add_out,
+    add_resubmit,
+    add_slurm,
+    add_yes,
+    load_job,
+    slurm_wishes,
+    sweep_folder,
+)
+from chimera_hpc.cli.run import open_or_plan
+from chimera_hpc.job.tables import Slurm
+from chimera_hpc.run.slurm import queue
+from chimera_hpc.run.slurm.queue import SlurmFailed, limit_seconds
+from chimera_hpc.run.slurm.script import ARRAY, LOGS, MODES, SCRIPTS, TIME, Target, job_name
+
+if TYPE_CHECKING:
+    from chimera_hpc.job import Sweep
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep slurm jobs/quickstart.toml --mode array
+  python -m chimera_hpc.sweep slurm jobs/quickstart.toml --mode array --array 16 --submit
+  python -m chimera_hpc.sweep slurm jobs/quickstart.toml --mode allocation --workers 64 --submit
+
+array: each element of a job array computes its share, nobody between; allocation: driver, scheduler
+and workers in one job; jobqueue: a small job that submits a job for each worker, for sites without
+long programs on login nodes (elsewhere: run JOB.toml --cluster slurm). A sweep begun in one way is
+finished in any other, or with `run` on a laptop. With --submit the store is planned, SLURM is asked
+whether it would take the job (sbatch --test-only), and after an array a second job reduces.
+"""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_job(parser)
+    add_out(parser)
+    add_block(parser)
+    add_yes(parser)
+    parser.add_argument("--mode", choices=MODES, default="array", help="which way (default: array)")
+    parser.add_argument("--workers", type=int, metavar="N", help="worker processes in all")
+    parser.add_argument("--array", type=int, metavar="N", help="elements of the job array")
+    parser.add_argument("--at-once", type=int, metavar="N", help="of which run at a time, at most")
+    add_slurm(parser)
+    add_resubmit(parser)
+    parser.add_argument(
+        "--drain", type=float, metavar="S", help="be over S seconds before a job's time limit"
+    )
+    parser.add_argument("--submit", action="store_true", help="submit it, too")
+    parser.add_argument("--no-reduce", action="store_true", help="no job that reduces afterwards")
+
+
+def execute(args: Namespace) -> int:
+    """Print or submit."""
+    sweep = load_job(args.job, args.overrides, args.block)
+    wishes = slurm_wishes(args, sweep)
+    _check_times(args, wishes)
+    target = _target(args, sweep)
+    if not args.submit:
+        print(SCRIPTS[args.mode](target, wishes), end="")
+        return Exit.COMPLETE
+    try:
+        return _submit_all(args, sweep, target, wishes)
+    except SlurmFailed as error:
+        raise BadInput(str(error)) from None
+
+
+def _check_times(args: Namespace, wishes: Slurm) -> None:
+    if args.resubmit < 0:
+        raise BadInput(f"--resubmit {args.resubmit}: allowed is 0 or more")
+    limit = limit_seconds(wishes.time or TIME)
+    # A job that is over before it begins would be put back into the queue for nothing.
+    if args.drain is not None and not 0 <= args.drain < limit:
+        raise BadInput(f"--drain {args.drain:g}: allowed is 0 up to the time limit, {limit:g} s")
+
+
+def _target(args: Namespace, sweep: Sweep) -> Target:
+    folder = sweep_folder(args.out, sweep)
+    overrides = [*args.overrides, *([f"run.block={args.block}"] if args.block else [])]
+    planned = args.submit or (folder / LOGS).is_dir()
+    return Target(
+        job=args.job.absolute(),
+        folder=folder,
+        name=job_name(folder / STORE, args.mode),
+        # SLURM makes no folders: a job whose log has no place fails without a word.
+        logs=folder / LOGS if planned else None,
+        resubmit=args.resubmit,
+        drain=args.drain,
+        overrides=tuple(overrides),
+        planned=planned,
+    )
+
+
+def _submit_all(args: Namespace, sweep: Sweep, target: Target, wishes: Slurm) -> int:
+    queue.check(SCRIPTS[args.mode](target, wishes.model_copy(update={"array": 1})))
+    store = open_or_plan(target.folder, sweep, args.yes)
+    if args.mode == "array":
+        wishes = _fitting(wishes, store.n_blocks)
+    first = job = _submit(target, args.mode, wishes)
+    print(f"submitted job {job} ({args.mode}); logs in {target.logs}")
+    if args.mode == "array" and not args.no_reduce:
+        last = replace(target, name=job_name(store.path, "reduce"))
+        job = _submit(last, "reduce", wishes, f"--dependency=afterany:{job}")
+        print(f"submitted job {job} (reduce)")
+    reason = queue.waits_for(first, target.name)
+    if reason is not None:
+        print(f"job {first} waits: {reason}")
+    return Exit.COMPLETE
+
+
+def _submit(target: Target, mode: str, wishes: Slurm, *options: str) -> str:
+    # The same job twice would do no harm, and no good either.
+    working = queue.jobs(target.name)
+    if working:
+        raise BadInput(f"job {working[0].id} does this already; the command cancel ends it")
+    path = target.folder / LOGS / f"{mode}.sbatch"
+    path.parent.mkdir(exist_ok=True)
+    write_atomically(path, SCRIPTS[mode](target, wishes).encode())
+    queue.check(path.read_text(), *options)
+    return queue.submit(path, *options, name=target.name)
+
+
+def _fitting(wishes: Slurm, n_blocks: int) -> Slurm:
+    """Return the wishes with as many elements as there are blocks and SLURM allows, at most."""
+    wanted = wishes.array or ARRAY
+    most = min(n_blocks, queue.most_array_elements() or n_blocks)
+    if wanted > most:
+        print(f"{most} elements in place of {wanted}: there are {n_blocks} blocks")
+    return wishes.model_copy(update={"array": min(wanted, most)})

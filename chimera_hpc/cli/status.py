@@ -1,0 +1,183 @@
+"""``status``: what is done, from the store alone."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chimera_hpc.base.exits import Exit
+from chimera_hpc.base.status import Status
+from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.cell_map import Cells, draw
+from chimera_hpc.cli.estimate import in_time
+from chimera_hpc.store.claims import live_claims
+from chimera_hpc.store.ledger import (
+    LedgerScan,
+    chunk_name,
+    ledger_shape,
+    read_metadata,
+    scan_ledger,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
+
+EPILOG = """examples:
+  python -m chimera_hpc.sweep status results/quickstart
+  python -m chimera_hpc.sweep status results/quickstart --json
+  python -m chimera_hpc.sweep status results/quickstart --failures
+
+The map has a sign a cell, and colours on a terminal unless NO_COLOR is set: capital letters are
+classes (O ordered, C chimera, D disordered, S steady) once the sweep was reduced. `watch` shows
+the same again and again.
+"""
+_RECENT_BLOCKS = 64
+_PAUSE = 60.0
+"""Seconds without a block, beyond what blocks take, after which work is taken to have stopped."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_folder(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--failures", action="store_true", help="list every failed point too")
+    parser.add_argument("--no-map", action="store_true", help="leave out the map of cells")
+
+
+def execute(args: Namespace) -> int:
+    """Print the state of the sweep."""
+    path = store_path(args.folder)
+    metadata = read_metadata(path)
+    scan = scan_ledger(path, metadata)
+    state = state_of(path, metadata, scan)
+    if args.json:
+        print(json.dumps(state))
+    else:
+        print("\n".join(lines_of(state)))
+        if not args.no_map:
+            _print_map(path, metadata, scan)
+    if args.failures and not args.json:
+        _print_failures(path, args.folder)
+    return Exit.FAILURES if state["failed"] else Exit.COMPLETE
+
+
+def state_of(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> dict[str, Any]:
+    """Return what `status --json` prints."""
+    n_points, block_size = ledger_shape(metadata)
+    codes = scan.columns["status"]
+    numbers = np.bincount(np.clip(codes, 0, None), minlength=max(Status) + 1)
+    counts = {code: int(numbers[code]) for code in Status}
+    finished = (codes >= Status.DONE) & (codes <= Status.NO_WINDOW)
+    mean = scan.columns["elapsed_us"][finished].mean() / 1e6 if finished.any() else None
+    running = len(live_claims(path))
+    rate = recent_rate(path, scan, block_size) if running else None
+    return {
+        "sweep": metadata["attributes"]["spec"].get("name", "?"),
+        "points": n_points,
+        "statuses": {code.name.lower(): n for code, n in counts.items() if n},
+        "done": int(np.count_nonzero(finished)),
+        "failed": sum(n for code, n in counts.items() if code.is_failure),
+        "pending": counts[Status.NEVER],
+        "blocks": len(scan.written),
+        "blocks_written": int(np.count_nonzero(scan.written)),
+        "blocks_running": running,
+        "blocks_damaged": len(scan.damaged),
+        "seconds_a_point": mean,
+        "core_seconds_left": None if mean is None else mean * counts[Status.NEVER],
+        "points_a_second": rate,
+        "seconds_left": counts[Status.NEVER] / rate if rate else None,
+    }
+
+
+def recent_rate(path: Path, scan: LedgerScan, block_size: int) -> float | None:
+    """Return the points that come in a second, by all who work on a store; None if unknown.
+
+    It is told from the times at which the latest blocks were written, back to the last pause, and
+    from how long the first of them took.
+    """
+    ends = np.array(_written_at(path, np.flatnonzero(scan.written)))
+    if not len(ends):
+        return None
+    work = scan.columns["elapsed_us"] / 1e6
+    starts = np.arange(0, len(work), block_size)
+    seconds = np.add.reduceat(work, starts)[scan.written]
+    tried = np.add.reduceat((scan.columns["status"] != Status.NEVER).astype(np.int64), starts)
+    order = np.argsort(ends)[-_RECENT_BLOCKS:]
+    ends, seconds, n_points = ends[order], seconds[order], tried[scan.written][order]
+    pauses = np.flatnonzero(np.diff(ends) > _PAUSE + 3.0 * seconds[1:])
+    recent = slice(int(pauses[-1]) + 1 if len(pauses) else 0, None)
+    span = time.time() - float((ends - seconds)[recent].min())
+    if time.time() - ends[-1] < _PAUSE + 3.0 * seconds.max():
+        # A block that is under way counts when it ends.
+        span = float(ends[-1] - (ends - seconds)[recent].min())
+    return float(n_points[recent].sum() / max(span, 1e-3))
+
+
+def _written_at(path: Path, blocks: np.ndarray[Any, Any]) -> list[float]:
+    folder = os.fspath(path / "ledger")
+    times = []
+    for block in blocks.tolist():
+        try:
+            times.append(os.stat(os.path.join(folder, chunk_name(block, 2))).st_mtime)
+        except OSError:
+            times.append(0.0)
+    return times
+
+
+def lines_of(state: Mapping[str, Any]) -> list[str]:
+    """Return the state in words."""
+    share = 100 * state["done"] / max(1, state["points"])
+    lines = [f"{state['sweep']}: {state['done']} of {state['points']} points done ({share:.1f} %)"]
+    for code in Status:
+        count = state["statuses"].get(code.name.lower())
+        if count:
+            lines.append(f"  {count:>9}  {code.sentence}")
+    lines.append(
+        f"  blocks: {state['blocks_written']} of {state['blocks']} written, "
+        f"{state['blocks_running']} running, {state['blocks_damaged']} damaged"
+    )
+    if state["points_a_second"]:
+        rate, left = state["points_a_second"], state["seconds_left"]
+        lines.append(f"  {rate:.3g} points a second now, about {in_time(left)} to go")
+    elif state["core_seconds_left"]:
+        left, mean = state["core_seconds_left"], state["seconds_a_point"]
+        lines.append(f"  about {in_time(left)} of one core to go, {mean:.3g} s a point")
+    return lines
+
+
+def map_of(cells: Cells | None, scan: LedgerScan, console: Console, height: int) -> Text | None:
+    """Return the map of cells for a console; None where there is none to show."""
+    if cells is None or len(cells.cell) != len(scan.columns["status"]):
+        return None
+    plain = not console.encoding.lower().startswith("utf")
+    return draw(cells, scan.columns["status"], console.width, height, plain)
+
+
+def _print_map(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> None:
+    cells = Cells.read(path, metadata)
+    if cells is None:
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    found = map_of(cells, scan, console, height=60)
+    if found is not None:
+        print()
+        console.print(found, no_wrap=True, crop=False, overflow="ignore")
+
+
+def _print_failures(path: Path, folder: Path) -> None:
+    from chimera_hpc.cli.ending import failures
+    from chimera_hpc.store.store import Store
+
+    store = Store.open(path)
+    for line in failures(store, folder, most=store.n_points):
+        print(line)

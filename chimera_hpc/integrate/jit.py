@@ -1,0 +1,131 @@
+"""The project's one way to compile: strict IEEE arithmetic, no GIL, a cache that never goes stale.
+
+numba keys its on-disk cache by the file of the compiled function alone, so a kernel that calls a
+function of another file would be served stale after an edit of that other file. Here the cache
+folder carries a digest of every source file that holds kernels, so an edit anywhere in them
+starts a fresh folder.
+
+numba itself is loaded when the first kernel is declared: where the kernels lie is known without it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import platform
+import re
+import shutil
+import tempfile
+import time
+import uuid
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_KERNEL_FOLDERS = ("integrate", "models", "measures")
+_UNUSED_DAYS = 30
+_OLD = re.compile(r"[0-9a-f]{16}(\.[0-9a-f]{32}\.old)?")
+"""Name of a cache folder, or of one whose removal was broken off."""
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the kernels' sources and of the versions that compile them (16 hex digits)."""
+    digest = hashlib.blake2b(digest_size=8)
+    digest.update(f"{version('numba')} {platform.python_version()}".encode())
+    for file in kernel_sources():
+        digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def kernel_sources() -> list[Path]:
+    """Return the source files that hold kernels."""
+    return [file for name in _KERNEL_FOLDERS for file in sorted((_PACKAGE / name).glob("*.py"))]
+
+
+@cache
+def cache_folder() -> str:
+    """Folder of the compiled kernels.
+
+    ``$NUMBA_CACHE_DIR`` where it is set (a cluster job sets it to a node-local folder), else
+    the user's cache folder, else, where that can't be written, a temporary folder. Folders beside
+    it, of other sources, that no process has asked for in `_UNUSED_DAYS` days are removed.
+    """
+    base = os.environ.get("NUMBA_CACHE_DIR")
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    root = Path(base) if base else Path(home) / "chimera_hpc" / "numba"
+    folder = root / source_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            os.utime(folder)
+            _remove_unused(root)
+            return str(folder)
+    except OSError:
+        pass
+    return tempfile.mkdtemp(prefix="chimera_hpc-numba-")
+
+
+def _remove_unused(root: Path) -> None:
+    """Remove the folders of other digests whose last use is long ago.
+
+    Each is moved away first, so that of several processes one removes it, and nobody meets half of
+    it.
+    """
+    before = time.time() - _UNUSED_DAYS * 86400
+    for folder in root.iterdir():
+        ours = _OLD.fullmatch(folder.name) and folder.name != source_digest()
+        with contextlib.suppress(OSError):
+            if ours and folder.stat().st_mtime < before:
+                doomed = folder.with_name(f"{folder.name.partition('.')[0]}.{uuid.uuid4().hex}.old")
+                folder.rename(doomed)
+                shutil.rmtree(doomed)
+
+
+def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """``numba.njit`` as every kernel of the project uses it.
+
+    Strict IEEE arithmetic (no fast-math flag of any kind, so a sum keeps its order and a NaN
+    stays a NaN), the GIL released, NumPy's rules for division, compiled code kept on disk, and no
+    runtime for memory: a kernel that allocates doesn't compile.
+    """
+    numba = _numba()
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = cache_folder()
+        try:
+            return numba.njit(
+                *signature, cache=True, nogil=True, error_model="numpy", _nrt=False, **options
+            )(function)
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return decorate
+
+
+def compile_anew(signature: Any, function: Callable[..., Any]) -> Any:
+    """Compile a user's function as `jit` does, but keep nothing of it on disk.
+
+    Its source, and what it calls, may be edited between two processes at any time.
+    """
+    options = {"nogil": True, "error_model": "numpy", "_nrt": False}
+    return _numba().njit(signature, **options)(function)
+
+
+def load_registries() -> None:
+    """Have numba read what it knows of functions, which it otherwise does for the first kernel."""
+    from numba.core.registry import cpu_target
+
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
+
+
+def _numba() -> Any:
+    # Typed loosely: numba's annotations know neither its configuration nor the option ``_nrt``.
+    return import_module("numba")

@@ -1,0 +1,307 @@
+"""Keeps the lanes of the stepping loop busy: puts trajectories in, takes finished ones out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate import stepper as kernel
+from chimera_hpc.integrate.lane_rows import (
+    ACCEPTED,
+    COUNT_ROWS,
+    FRESH,
+    IDLE,
+    LANE_ROWS,
+    LOG_ERROR,
+    NEXT_SAMPLE,
+    RUNNING,
+    STATE,
+)
+from chimera_hpc.integrate.scratch import aligned, lent
+from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.integrate.tableau import Tableau
+from chimera_hpc.integrate.tsit5 import TSIT5
+
+Array = NDArray[np.float64]
+
+# Wall time that one call of the compiled loop aims at, seconds: the GIL comes back, time-outs and
+# stop signals are seen.
+SLICE = 0.1
+# Steps times numbers of the state in the first call, before the speed is known, and its most steps.
+FIRST_WORK, FIRST_STEPS = 2_000_000, 64
+# Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
+SAMPLE_BYTES = 96_000_000
+# Bytes of state that a pack may work on: as much as stays in a core's second cache. Beyond, one
+# lane after the other is faster, since it has an eighth of it.
+PACK_BYTES = 1_000_000
+# Fewer trajectories than this go one by one: idle lanes of a pack cost as much as busy ones.
+WORTH_A_PACK = 3
+
+
+class System(Protocol):
+    """What the integrator needs to know of a model with its parameters (see `models`)."""
+
+    @property
+    def n_rows(self) -> int: ...
+    @property
+    def right_hand_side(self) -> Any: ...
+    @property
+    def int_params(self) -> NDArray[np.int64]: ...
+    @property
+    def lane_params(self) -> Array: ...
+
+
+@dataclass(frozen=True)
+class Control:
+    """How to integrate and where to sample.
+
+    Samples are taken at ``start + i * step`` as far as ``t_end``.
+    """
+
+    t_end: float
+    start: float
+    step: float
+    rtol: float = 1e-3
+    atol: float = 1e-6
+    method: Tableau = TSIT5
+    max_steps: int = 10_000_000
+    time_out: float = 600.0
+
+    @property
+    def n_samples(self) -> int:
+        """Number of sampling times."""
+        # A step that fits but for rounding counts: (1000 - 950) / 0.01 is a hair below 5000.
+        return int((self.t_end - self.start) / self.step + 1e-6) + 1
+
+    @property
+    def times(self) -> Array:
+        """Sampling times, shape (n_samples,)."""
+        times: Array = np.minimum(self.start + np.arange(self.n_samples) * self.step, self.t_end)
+        return times
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One trajectory's end: status, work done, sampled rows and last state.
+
+    ``samples`` (n_observed, n_samples) is a view, time by time in memory, of a buffer that is used
+    again, by later calls of `integrate` too: take what is needed before returning; ``n_sampled`` of
+    its columns were reached.
+    ``status`` is DONE or one of the integrator's failures.
+    """
+
+    status: Status
+    steps: int
+    elapsed: float
+    samples: Array
+    n_sampled: int
+    y_end: Array
+
+
+class Stopped(Exception):
+    """The caller asked to stop before every trajectory had ended."""
+
+
+class Lanes:
+    """The state of the stepping loop's lanes (arrays as in `kernel`).
+
+    ``samples`` (lanes, n_samples, width) is room for samples in whole packs; new by default.
+    """
+
+    def __init__(
+        self,
+        lanes: int,
+        system: System,
+        control: Control,
+        n_observed: int,
+        samples: Array | None = None,
+    ) -> None:
+        method = control.method
+        # One lane has its rows in packs, up to the last one: rows of zeros fill that. Samples are
+        # written in packs from any number of lanes.
+        self.size = system.n_rows
+        width = _in_packs(n_observed)
+        rows = _in_packs(self.size) if lanes == 1 else max(self.size, width)
+        self.n_observed = n_observed
+        self.control, self.method = control, method
+        self.rhs, self.ints = system.right_hand_side, system.int_params
+        self.advance = kernel.advance(lanes)
+        self.params = aligned(len(system.lane_params), lanes)
+        self.params[:] = system.lane_params[:, None]
+        self.y, self.y1 = aligned(rows, lanes), aligned(rows, lanes)
+        self.k = aligned((method.stages + 1) * rows, lanes)
+        self.weights = aligned(2 * method.stages, LANES)
+        self.lane = aligned(LANE_ROWS, lanes)
+        self.count = np.zeros((COUNT_ROWS, lanes), dtype=np.int64)
+        self.count[STATE] = IDLE
+        if samples is None:
+            samples = aligned(lanes, control.n_samples, width, fill=np.empty)
+        self.samples = samples
+        self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
+
+    def put(self, m: int, y0: Array, params: Array) -> None:
+        """Begin a trajectory in lane ``m``."""
+        self.y[: self.size, m] = y0
+        self.params[:, m] = params
+        self.lane[:, m] = 0.0
+        self.lane[LOG_ERROR, m] = kernel.LOG_ERROR_FLOOR
+        self.count[:, m] = 0
+        self.count[STATE, m] = FRESH
+        if self.control.start <= 0.0:
+            self.sampled(m)[:, 0] = y0[: self.n_observed]
+            self.count[NEXT_SAMPLE, m] = 1
+
+    def sampled(self, m: int) -> Array:
+        """Samples of lane ``m``, shape (n_observed, n_samples)."""
+        samples: Array = self.samples[m, :, : self.n_observed].T
+        return samples
+
+    def clear(self, m: int) -> None:
+        """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""
+        self.y[:, m] = self.y1[:, m] = self.k[:, m] = 0.0
+        self.lane[:, m] = 0.0
+        self.count[STATE, m] = IDLE
+
+    def run(self) -> float:
+        """Call the compiled loop once; returns the wall time it took, seconds."""
+        c, m = self.control, self.method
+        began = time.perf_counter()
+        done = self.advance(
+            *(self.rhs, self.params, self.ints, self.y, self.y1, self.k, self.weights),
+            *(
+                self.lane,
+                self.count,
+                self.size,
+                m.a,
+                m.e,
+                m.p,
+                float(m.order),
+                c.rtol,
+                c.atol,
+                c.t_end,
+            ),
+            *(c.max_steps, c.start, c.step, self.samples, self.iterations),
+        )
+        elapsed = time.perf_counter() - began
+        if done == self.iterations:
+            scale = SLICE / max(elapsed, 1e-6)
+            self.iterations = int(self.iterations * min(max(scale, 0.25), 8.0)) + 1
+        return elapsed
+
+
+def _in_packs(n: int) -> int:
+    return -(-n // LANES) * LANES
+
+
+def choose_lanes(
+    n_trajectories: int, n_rows: int, stages: int, n_observed: int, n_samples: int
+) -> int:
+    """One lane or a pack, from the number of trajectories and the memory that they take."""
+    fits = LANES * _in_packs(n_observed) * n_samples * 8 <= SAMPLE_BYTES
+    fits = fits and LANES * (stages + 3) * n_rows * 8 <= PACK_BYTES
+    return LANES if n_trajectories >= WORTH_A_PACK and fits else 1
+
+
+def integrate(
+    systems: Sequence[System],
+    states: Sequence[Array] | Callable[[int], Array],
+    control: Control,
+    n_observed: int,
+    on_end: Callable[[int, Outcome], None],
+    should_stop: Callable[[], bool] | None = None,
+    lanes: int | None = None,
+) -> None:
+    """Integrate trajectories that can share a kernel call, several at a time.
+
+    The bits of a trajectory do not depend on the others, nor on the number of lanes.
+
+    Parameters
+    ----------
+    systems : sequence
+        One per trajectory, equal in right-hand side and integer parameters.
+    states : sequence of shape (n_rows,)
+        Initial states, or a function of the trajectory's number that gives it.
+    control : Control
+    n_observed : int
+        The first ``n_observed`` rows are sampled.
+    on_end : callable
+        Called with (number, `Outcome`) as each trajectory ends, in order of ending.
+    should_stop : callable, optional
+        Asked about ten times a second.
+    lanes : int, optional
+        1 or `LANES`; chosen from the work by default.
+
+    Raises
+    ------
+    Stopped
+        When ``should_stop`` said so.
+    """
+    if not systems:
+        return
+    initial = states if callable(states) else states.__getitem__
+    rows, stages = systems[0].n_rows, control.method.stages
+    width = lanes or choose_lanes(len(systems), rows, stages, n_observed, control.n_samples)
+    # Kept is what a pack needs, for which `choose_lanes` sets a bound; the samples of a trajectory
+    # alone may have any size, and `simulate` hands them on.
+    shape = width, control.n_samples, _in_packs(n_observed)
+    with nullcontext() if width == 1 else lent(*shape) as samples:
+        pool = Lanes(width, systems[0], control, n_observed, samples)
+        _work_through(pool, systems, initial, on_end, should_stop)
+
+
+def _work_through(
+    pool: Lanes,
+    systems: Sequence[System],
+    initial: Callable[[int], Array],
+    on_end: Callable[[int, Outcome], None],
+    should_stop: Callable[[], bool] | None,
+) -> None:
+    """Keep the lanes busy until every trajectory has ended."""
+    width = pool.y.shape[1]
+    waiting = iter(range(len(systems)))
+    holds: list[int | None] = [None] * width
+    spent = np.zeros(width)
+    since = np.zeros(width)
+
+    def fill(m: int) -> None:
+        number = next(waiting, None)
+        holds[m] = number
+        if number is None:
+            pool.clear(m)
+            return
+        pool.put(m, initial(number), systems[number].lane_params)
+        spent[m], since[m] = 0.0, time.perf_counter()
+
+    for m in range(width):
+        fill(m)
+    while any(number is not None for number in holds):
+        if should_stop is not None and should_stop():
+            raise Stopped
+        busy = [m for m in range(width) if holds[m] is not None]
+        spent[busy] += pool.run() / len(busy)
+        now = time.perf_counter()
+        for m in busy:
+            number, state = holds[m], int(pool.count[STATE, m])
+            if state == RUNNING and now - since[m] > pool.control.time_out:
+                state = int(Status.TIME_OUT)
+            if state == RUNNING or number is None:
+                continue
+            on_end(
+                number,
+                Outcome(
+                    Status(state),
+                    int(pool.count[ACCEPTED, m]),
+                    float(spent[m]),
+                    pool.sampled(m),
+                    int(pool.count[NEXT_SAMPLE, m]),
+                    pool.y[: pool.size, m].copy(),
+                ),
+            )
+            fill(m)

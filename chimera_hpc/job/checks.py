@@ -1,0 +1,185 @@
+"""What must hold between the keys of a job: known names, complete parameters, limits, size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import prod
+from typing import Any, TypeVar
+
+import numpy as np
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.axes import Axis, Values, normal_form, parse_axis, references, resolve
+from chimera_hpc.job.parameters import DELTA, SEED, SEED_COUNT
+from chimera_hpc.job.points import expand, refuse_huge
+from chimera_hpc.job.tables import Features, Integrator, unknown_key
+from chimera_hpc.models.parameters import Column, Limit, ModelParameters, Parameter
+
+Fixed = Mapping[str, int | float]
+Result = TypeVar("Result")
+MAX_SAMPLES = 10**9
+"""Most samples of one point's analysis."""
+
+
+def normal_grid(model: ModelParameters, grid: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the axes in normal form, `seeds` last (1 when missing); BadInput for a wrong axis."""
+    normal: dict[str, Any] = {}
+    for name, raw in grid.items():
+        if name == "n_nodes":
+            raise BadInput("grid.n_nodes: one for a whole sweep; set it in [fixed]")
+        if name != "seeds":
+            normal[name] = normal_form(_parse(name, raw, axis_parameter(model, name)))
+    seeds = parse_seeds(grid.get("seeds", 1))
+    count = len(seeds.values)
+    is_count = normal_form(seeds) == normal_form(Values(range(count)))
+    return {**normal, "seeds": count if is_count else normal_form(seeds)}
+
+
+def complete_fixed(
+    model: ModelParameters, fixed: Mapping[str, Any], axes: Mapping[str, Any]
+) -> Fixed:
+    """Return n_nodes and every parameter that is not an axis, defaults filled in."""
+    known = {parameter.name: parameter for parameter in (model.n_nodes, *model.parameters)}
+    for name in fixed:
+        if name not in known:
+            raise BadInput(unknown_key("fixed", name, list(known)))
+        if name in axes:
+            raise BadInput(
+                f"fixed.{name}: {name} is an axis in [grid] already, set it in one of them"
+            )
+    complete = {}
+    for name, parameter in known.items():
+        if name in axes:
+            continue
+        value = fixed.get(name, parameter.default)
+        if value is None:
+            raise BadInput(
+                f"grid.{name}: missing; {name} must be an axis in [grid] or set in [fixed]"
+            )
+        complete[name] = _at(f"fixed.{name}", parameter.check, value) + 0  # + 0: no -0.0
+    return complete
+
+
+def axes_of(model: ModelParameters, grid: Mapping[str, Any], fixed: Fixed) -> dict[str, Axis]:
+    """Return the axes by the name of their column, names of fixed parameters replaced, `seed` last.
+
+    Raises BadInput for a name that is neither an axis nor fixed, or not of the right type.
+    """
+    axes: dict[str, Axis] = {}
+    for name, raw in grid.items():
+        if name == "seeds":
+            continue
+        parameter = axis_parameter(model, name)
+        axis = _at(f"grid.{name}", resolve, _parse(name, raw, parameter), fixed, parameter)
+        for other in references(axis):
+            if other not in grid or other == "seeds":
+                known = [key for key in (*grid, *fixed) if key not in ("seeds", name)]
+                raise BadInput(f"grid.{name}: {other} is not an axis{nearest(other, known)}")
+            if parameter.kind is int and axis_parameter(model, other).kind is float:
+                raise BadInput(f"grid.{name}: must be integers, and {other} is not")
+        axes[name] = axis
+    return {**axes, "seed": parse_seeds(grid["seeds"])}
+
+
+def axis_parameter(model: ModelParameters, name: str) -> Parameter:
+    """Return what an axis may be: a parameter of the model or the radius `delta`."""
+    parameter = DELTA if name == "delta" else model.find(name)
+    if parameter is None:
+        known = [*(p.name for p in model.parameters), "delta", "seeds"]
+        raise BadInput(unknown_key("grid", name, known))
+    return parameter
+
+
+def parse_seeds(raw: Any) -> Values:
+    """Return the seeds of a count n (0 to n - 1), a list or a range; BadInput for others."""
+    if type(raw) is int:
+        return Values(range(int(_at("grid.seeds", SEED_COUNT.check, raw))))
+    axis = _parse("seeds", raw, SEED)
+    if not isinstance(axis, Values):
+        raise BadInput(
+            f"grid.seeds: {short(raw)} is neither a count, a list nor a range of integers"
+        )
+    return axis
+
+
+def check_points(model: ModelParameters, axes: Mapping[str, Axis], fixed: Fixed) -> None:
+    """Raise BadInput for a point beyond the model's limits and for too many points.
+
+    Only the axes that limits and dependent axes speak of are multiplied out, so that a wrong grid
+    costs little.
+    """
+    limited = {name for limit in model.limits for name in (limit.name, *limit.needs)}
+    linked = {name for axis in axes.values() for name in references(axis)}
+    linked |= limited | {name for name, axis in axes.items() if references(axis)}
+    single = {name: Values((int(fixed[name]),)) for name in limited if name in fixed}
+
+    def check(name: str, columns: Mapping[str, Column]) -> None:
+        if name in axes and references(axes[name]):
+            parameter = axis_parameter(model, name)
+            for value in (columns[name].min(), columns[name].max()):
+                _at(f"grid.{name}", parameter.check, value.item())
+        for limit in model.limits:
+            mine = {limit.name, *limit.needs}
+            if name in mine and mine <= set(columns):
+                _check_limit(limit, columns, int(fixed["n_nodes"]), fixed)
+
+    linked_axes = {name: axis for name, axis in axes.items() if name in linked}
+    rows = expand({**single, **linked_axes}, check)
+    free = [axis for name, axis in axes.items() if name not in linked]
+    n_rows = max(map(len, rows.values()), default=1)
+    refuse_huge(n_rows * prod(len(axis.values) for axis in free if isinstance(axis, Values)))
+
+
+def check_tables(
+    integrator: Integrator, features: Features, model: ModelParameters, axes: Mapping[str, Axis]
+) -> None:
+    """Raise BadInput for settings that contradict each other or the model."""
+    length = integrator.t_end - features.start
+    if length <= 0:
+        text = f"is outside the run, it must be below integrator.t_end = {integrator.t_end:g}"
+        raise BadInput(f"features.start: {features.start:g} {text}")
+    if not length / MAX_SAMPLES <= integrator.t_step <= length:
+        text = f"is not between 1 / {MAX_SAMPLES:.0e} and all of the analysis, {length:g} long"
+        raise BadInput(f"integrator.t_step: {integrator.t_step:g} {text}")
+    if integrator.form not in model.forms:
+        raise BadInput(f"integrator.form: this model has only {', '.join(model.forms)}")
+    if integrator.centre != "origin":
+        c = axes.get("c")
+        if not isinstance(c, Values) or 0 in c.values:
+            text = f"{integrator.centre} has v = -b/c, so the model must have a c, not 0"
+            raise BadInput(f"integrator.centre: {text}")
+
+
+def check_nodes(features: Features, n_nodes: int) -> None:
+    """Raise BadInput for a node outside the ring, and for more groups than nodes."""
+    if features.clock_node >= n_nodes:
+        text = f"is outside the ring, 0 to {n_nodes - 1} is allowed"
+        raise BadInput(f"features.clock_node: {features.clock_node} {text}")
+    if features.groups > n_nodes:
+        raise BadInput(f"features.groups: {features.groups} is more than n_nodes = {n_nodes}")
+
+
+def _check_limit(limit: Limit, columns: Mapping[str, Column], n_nodes: int, fixed: Fixed) -> None:
+    highest = np.broadcast_to(limit.highest(columns, n_nodes), columns[limit.name].shape)
+    beyond = columns[limit.name] > highest
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        table = "fixed" if limit.name in fixed else "grid"
+        given = "".join(f", {name} = {columns[name][row]}" for name in limit.needs)
+        raise BadInput(
+            f"{table}.{limit.name}: {columns[limit.name][row]} is too large, at most {highest[row]}"
+            f" is allowed ({limit.text}; n_nodes = {n_nodes}{given})"
+        )
+
+
+def _parse(name: str, raw: Any, parameter: Parameter) -> Axis:
+    return _at(f"grid.{name}", parse_axis, raw, parameter)
+
+
+def _at(key: str, function: Callable[..., Result], *arguments: Any) -> Result:
+    """Call the function; put the key before the message of its BadInput."""
+    try:
+        return function(*arguments)
+    except BadInput as error:
+        raise BadInput(f"{key}: {error}") from None

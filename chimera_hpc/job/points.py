@@ -1,0 +1,195 @@
+"""Points of a sweep as columns: one array a quantity, never an object a point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.job.axes import Axis, Between, Same, Values, references
+from chimera_hpc.models.parameters import Column
+
+MAX_POINTS = 10**8
+"""Most points of one sweep."""
+
+DTYPES: dict[type, type[np.int64] | type[np.float64]] = {int: np.int64, float: np.float64}
+_MAX_CODE = 2**62
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """A list of points, in the order of the store.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray, shape (n_points,)
+        Every parameter of the model, `delta` and `seed`, whether an axis or fixed; int64 or
+        float64, read-only.
+    axes : tuple of str
+        Names of the columns that vary, first slowest; `seed` is the last one.
+    """
+
+    columns: dict[str, Column]
+    axes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if len({len(column) for column in self.columns.values()}) != 1:
+            raise ValueError("the columns of points must be equally long, and at least one")
+        for column in self.columns.values():
+            column.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def __getitem__(self, which: slice | NDArray[Any]) -> Points:
+        """Return the points of a slice, of an array of indices or of a mask, in its order."""
+        return Points({name: column[which] for name, column in self.columns.items()}, self.axes)
+
+    def row(self, i: int) -> dict[str, int | float]:
+        """Return point i as plain numbers by name."""
+        return {name: column[i].item() for name, column in self.columns.items()}
+
+    def find(self, **values: float) -> NDArray[np.int64]:
+        """Return the indices of the points with exactly these values; BadInput for other names."""
+        found = np.ones(len(self), dtype=bool)
+        for name, value in values.items():
+            if name not in self.columns:
+                raise BadInput(f"{name}: no such parameter; known: {', '.join(self.columns)}")
+            found &= self.columns[name] == value
+        return np.flatnonzero(found)
+
+    def cells(self) -> tuple[NDArray[np.int64], dict[str, Column]]:
+        """Return the cells: the different combinations of all columns but the seed.
+
+        Returns
+        -------
+        cell_id : ndarray of int64, shape (n_points,)
+            Number of each point's cell; cells are numbered in the order of their first point.
+        columns : dict of str to ndarray, shape (n_cells,)
+            The columns but the seed, once a cell.
+        """
+        code = np.zeros(len(self), dtype=np.int64)
+        n_codes = min(1, len(self))
+        for name, column in self.columns.items():
+            if name == "seed" or n_codes == 0 or bool((column == column[0]).all()):
+                continue
+            values, number = np.unique(column, return_inverse=True)
+            if n_codes * len(values) > _MAX_CODE:
+                _, code = np.unique(code, return_inverse=True)
+                n_codes = len(self)
+            code = code * len(values) + number
+            n_codes *= len(values)
+        _, first, number = np.unique(code, return_index=True, return_inverse=True)
+        rank = np.empty(len(first), dtype=np.int64)
+        rank[np.argsort(first)] = np.arange(len(first))
+        first.sort()
+        cells = {name: column[first] for name, column in self.columns.items() if name != "seed"}
+        return rank[number], cells
+
+
+def dependency_order(axes: Mapping[str, Axis]) -> list[str]:
+    """Return the names so that each comes after those it depends on, otherwise as declared.
+
+    Raises BadInput for a circle; every name must be an axis.
+    """
+    order: list[str] = []
+    waiting = list(axes)
+    while waiting:
+        ready = next((n for n in waiting if set(references(axes[n])) <= set(order)), None)
+        if ready is None:
+            circle = ", ".join(waiting)
+            raise BadInput(f"grid.{waiting[0]}: the axes {circle} depend on each other in a circle")
+        order.append(ready)
+        waiting.remove(ready)
+    return order
+
+
+def expand(
+    axes: Mapping[str, Axis],
+    check: Callable[[str, dict[str, Column]], None] = lambda name, columns: None,
+) -> dict[str, Column]:
+    """Return the product of the axes as columns, the first axis slowest.
+
+    Parameters
+    ----------
+    axes : mapping of str to Axis
+        In order of declaration; a dependent axis takes, for each value of the axes it names, its
+        own values.
+    check : callable
+        Called with the name of each new column and the columns so far, in order of dependence: it
+        may raise before a later axis makes the product large.
+
+    Raises
+    ------
+    BadInput
+        More than `MAX_POINTS` rows, a circle, or a dependent range that is empty somewhere.
+    """
+    order = dependency_order(axes)
+    columns: dict[str, Column] = {}
+    n_rows = 1
+    for name in order:
+        rows, column = _extend(name, axes[name], columns, n_rows)
+        columns = {known: values[rows] for known, values in columns.items()}
+        columns[name] = column
+        n_rows = len(column)
+        check(name, columns)
+    if order != list(axes):
+        keys = [_rank(axes[name], columns[name]) for name in axes]
+        by_declaration = np.lexsort(keys[::-1])
+        columns = {name: columns[name][by_declaration] for name in axes}
+    return columns
+
+
+def _extend(
+    name: str, axis: Axis, columns: Mapping[str, Column], n_rows: int
+) -> tuple[NDArray[np.int64], Column]:
+    """Return which old row each new row continues, and the new column."""
+    if isinstance(axis, Same):
+        return np.arange(n_rows), columns[axis.name]
+    if isinstance(axis, Values):
+        refuse_huge(n_rows * len(axis.values))
+        rows = np.repeat(np.arange(n_rows), len(axis.values))
+        return rows, np.tile(as_array(axis), n_rows)
+    low, high = (
+        np.full(n_rows, end) if isinstance(end, int) else columns[end].astype(np.int64)
+        for end in (axis.low, axis.high)
+    )
+    counts = (high - low) // axis.step + 1
+    if (counts < 1).any():
+        _refuse_empty(name, axis, columns, int(np.argmax(counts < 1)))
+    refuse_huge(counts.sum(dtype=np.float64))
+    rows = np.repeat(np.arange(n_rows), counts)
+    place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return rows, low[rows] + axis.step * place
+
+
+def as_array(axis: Values) -> Column:
+    """Return the values of an independent axis, int64 or float64."""
+    values = axis.values
+    if isinstance(values, range):
+        return np.arange(values.start, values.stop, values.step, dtype=np.int64)
+    return np.array(values, dtype=np.int64 if isinstance(values[0], int) else np.float64)
+
+
+def _rank(axis: Axis, column: Column) -> NDArray[Any]:
+    """Return a number that rises with the place of each value on its axis."""
+    if not isinstance(axis, Values):
+        return column
+    values = as_array(axis)
+    by_value = np.argsort(values)
+    return by_value[np.searchsorted(values[by_value], column)]
+
+
+def refuse_huge(n_points: float) -> None:
+    """Raise BadInput for more than `MAX_POINTS`."""
+    if n_points > MAX_POINTS:
+        raise BadInput(f"grid: {n_points:.3g} points or more, at most {MAX_POINTS:.0e} are allowed")
+
+
+def _refuse_empty(name: str, axis: Between, columns: Mapping[str, Column], row: int) -> None:
+    where = ", ".join(f"{n} = {columns[n][row]}" for n in references(axis))
+    raise BadInput(f"grid.{name}: the range {axis} is empty at {where}")

@@ -1,0 +1,90 @@
+"""The JSON Schema of a job file, from the same tables that check one: for editors and other tools.
+
+It knows what a key is, not what holds between keys (2 P below n_nodes, a range that is not empty):
+a file that it passes may still be refused, and `plan` then says why.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from chimera_hpc.job.models import built_in
+from chimera_hpc.job.parameters import DELTA
+from chimera_hpc.job.selection import ANALYSES, CURVE_FIGURES, CUT_FIGURES, FIGURES
+from chimera_hpc.job.spec import Sweep
+from chimera_hpc.job.tables import TABLES, Reduction
+from chimera_hpc.models.parameters import ModelParameters
+
+FILE_NAME = "job.schema.json"
+"""Name of the schema beside the job files that come with the package."""
+
+_USER_MODEL = {"type": "string", "pattern": ":", "description": "package.module:object"}
+_AT_LEAST_ONE = {  # keys of which a list may be written as one value
+    "reduction": ("atlas", "beside"),
+}
+
+
+def job_schema() -> dict[str, Any]:
+    """Return the schema as plain data (JSON Schema, draft 2020-12).
+
+    A model's own parameters are the only ones allowed in [grid] and [fixed]; for a user's model,
+    whose parameters are not known here, any are.
+    """
+    schema: dict[str, Any] = Sweep.model_json_schema()
+    properties = schema["properties"]
+    known = {"enum": list(built_in())}
+    properties["model"] = {
+        "anyOf": [known, _USER_MODEL],
+        "description": properties["model"]["description"],
+    }
+    for table in ("grid", "fixed"):
+        del properties[table]["additionalProperties"]
+        properties[table].pop("default", None)
+    for table, names in _AT_LEAST_ONE.items():
+        keys = schema["$defs"][TABLES[table].__name__]["properties"]
+        for name in names:
+            _allow_one(keys[name])
+    _name_figures_and_analyses(schema["$defs"][Reduction.__name__]["properties"])
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "Job file of chimera_hpc",
+        "allOf": [_only_for(name, model) for name, model in built_in().items()],
+    }
+
+
+def schema_text() -> str:
+    """Return the schema as the text of a file."""
+    return json.dumps(job_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+def _only_for(name: str, model: ModelParameters) -> dict[str, Any]:
+    """Return the rule that [grid] and [fixed] hold only what this model knows."""
+    parameters = [parameter.name for parameter in model.parameters]
+    numbers = (model.n_nodes, *model.parameters)
+    defaults = {p.name: {"default": p.default} for p in numbers if p.default is not None}
+    allowed = {
+        "grid": {"propertyNames": {"enum": [*parameters, DELTA.name, "seeds"]}},
+        "fixed": {
+            "propertyNames": {"enum": [model.n_nodes.name, *parameters]},
+            "properties": defaults,
+        },
+    }
+    return {
+        "if": {"properties": {"model": {"const": name}}, "required": ["model"]},
+        "then": {"properties": allowed},
+    }
+
+
+def _name_figures_and_analyses(keys: dict[str, Any]) -> None:
+    cuts = "|".join(CUT_FIGURES)
+    figure = {"anyOf": [{"enum": [*FIGURES, *CURVE_FIGURES]}, {"pattern": f"^({cuts})(_[0-9]+)?$"}]}
+    for kind in keys["figures"]["anyOf"]:
+        kind |= {"items": figure} if kind["type"] == "array" else {"const": "auto"}
+    keys["analyses"]["items"] = {"type": "string", "enum": list(ANALYSES)}
+
+
+def _allow_one(key: dict[str, Any]) -> None:
+    of_list = {name: key.pop(name) for name in ("items", "type") if name in key}
+    key["anyOf"] = [of_list, of_list["items"]]

@@ -1,0 +1,151 @@
+"""What a job may ask to be drawn: points by their values, figures by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.models import built_in
+from chimera_hpc.job.parameters import DELTA, SEED
+from chimera_hpc.models.parameters import ModelParameters, Parameter
+
+FIGURES = ("space_time", "indicators", "whole_run")
+"""Names of the figures of a sweep, drawn by `chimera_hpc.plot.catalogue`."""
+CURVE_FIGURES = (
+    "networks",
+    "stability",
+    "basin",
+    "atlas",
+    "robustness",
+    "incoherence",
+    "incoherence_delta",
+    "sigma_l",
+    "agreement",
+    "verdicts",
+    "reconstruction",
+    "synthetic_signal",
+    "spectrum",
+)
+"""Names of the figures of analyses."""
+ANALYSES = (
+    "networks",
+    "stability",
+    "basin",
+    "oscillation",
+    "variations",
+    "atlas",
+    "robustness",
+    "incoherence",
+    "sigma-l",
+    "agreement",
+    "synthetic",
+    "spectrum",
+)
+"""Names of the analyses, made by `chimera_hpc.reduction.analyses`."""
+CUT_FIGURES = ("dendrogram", "projections", "modal_classes", "classification")
+"""Names of the figures of one cut; the number of clusters may follow, as in dendrogram_3."""
+
+_PARAMETERS = {p.name: p for model in built_in().values() for p in (*model.parameters, DELTA, SEED)}
+_EXAMPLE = 'NAME=NUMBER is needed, such as "P=9 Q=9 seed=0"'
+_WORD = re.compile(r"\w+=[-+.\w]+", re.ASCII)
+_INTEGER = re.compile(r"[-+]?[0-9]{1,30}")
+_NUMBERED = re.compile(r"([a-z_]+)_([1-9][0-9]{0,8})")
+
+
+def parse_selection(
+    text: str, key: str = "selection", known: Mapping[str, Parameter] | None = None
+) -> dict[str, int | float]:
+    """Return the values by name of a text such as ``P=9 Q=9 seed=0``.
+
+    `key` begins the message of the BadInput for anything else: words that are not NAME=NUMBER, a
+    name twice, and where it is said what is `known`, other names and values.
+    """
+    where = f"{key}: {short(text)}"
+    values: dict[str, int | float] = {}
+    for word in text.split():
+        name, _, number = word.partition("=")
+        if not _WORD.fullmatch(word):
+            raise BadInput(f"{where}: {_EXAMPLE}")
+        if known is not None and name not in known:
+            raise BadInput(f"{where}: unknown {short(name)}{nearest(name, list(known))}")
+        if name in values:
+            raise BadInput(f"{where}: {name} is given twice")
+        try:
+            value = int(number) if _INTEGER.fullmatch(number) else float(number)
+            values[name] = value if known is None else known[name].check(value)
+        except ValueError as error:
+            raise BadInput(f"{where}: {name}: {error}") from None
+    if not values:
+        raise BadInput(f"{where}: {_EXAMPLE}")
+    return values
+
+
+def check_names(key: str, texts: Sequence[str], model: ModelParameters | None) -> None:
+    """Raise BadInput for a selection with a name or value that the model does not know.
+
+    Without a model: that none of the project's own models knows; a selection may speak of another
+    sweep.
+    """
+    known = _PARAMETERS
+    if model is not None:
+        known = {p.name: p for p in (*model.parameters, DELTA, SEED)}
+    for text in texts:
+        parse_selection(text, key, known)
+
+
+def split_figure_name(name: str) -> tuple[str, int | None]:
+    """Return a figure's name and its number of clusters: dendrogram_3 is (dendrogram, 3)."""
+    found = _NUMBERED.fullmatch(name)
+    return (found.group(1), int(found.group(2))) if found else (name, None)
+
+
+def check_selections(key: str) -> Callable[[Any], Any]:
+    """Return what turns a list of selections into a tuple of texts, or raises BadInput.
+
+    Names are checked by `check_names`, which knows the model.
+    """
+
+    def check(value: Any) -> tuple[str, ...]:
+        texts = _texts(value)
+        if texts is None:
+            raise BadInput(f'{key}: {short(value)} is not a list such as ["P=9 Q=9 seed=0"]')
+        for text in texts:
+            parse_selection(text, key)
+        return texts
+
+    return check
+
+
+def check_figures(value: Any) -> Any:
+    """Pass "auto", or return a tuple of known names of figures; BadInput for others."""
+    if value == "auto":
+        return value
+    names, known = _texts(value), [*FIGURES, *CURVE_FIGURES, *CUT_FIGURES]
+    if names is None:
+        text = f'{short(value)} is neither "auto" nor a list of names; known: {", ".join(known)}'
+        raise BadInput(f"reduction.figures: {text}")
+    for name in names:
+        if not (name in known or split_figure_name(name)[0] in CUT_FIGURES):
+            hint = nearest(name, known)
+            raise BadInput(f"reduction.figures: {short(name)} is not a figure{hint}")
+    return names
+
+
+def check_analyses(value: Any) -> tuple[str, ...]:
+    """Return a tuple of known names of analyses; BadInput for others."""
+    names = _texts(value)
+    if names is None:
+        raise BadInput(f"reduction.analyses: {short(value)} is not a list of names")
+    for name in names:
+        if name not in ANALYSES:
+            hint = nearest(name, list(ANALYSES))
+            raise BadInput(f"reduction.analyses: {short(name)} is not an analysis{hint}")
+    return names
+
+
+def _texts(value: Any) -> tuple[str, ...] | None:
+    is_list = isinstance(value, list | tuple) and all(isinstance(item, str) for item in value)
+    return tuple(value) if is_list else None

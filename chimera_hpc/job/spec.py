@@ -1,0 +1,245 @@
+"""The sweep as a value: a job file, validated and frozen."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from hashlib import blake2b
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import (
+    Field,
+    StringConstraints,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from chimera_hpc.base.wording import short
+from chimera_hpc.job.axes import Axis, Values
+from chimera_hpc.job.checks import (
+    axes_of,
+    check_nodes,
+    check_points,
+    check_tables,
+    complete_fixed,
+    normal_grid,
+    parse_seeds,
+)
+from chimera_hpc.job.models import look_in, parameters_of
+from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
+from chimera_hpc.job.points import DTYPES, Points, expand
+from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
+from chimera_hpc.job.selection import check_names
+from chimera_hpc.job.tables import Features, Integrator, Keep, Line, Reduction, Run, Slurm, Table
+
+_FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
+_DIGESTED = ("model", "grid", "fixed", "integrator", "features")
+
+
+class Sweep(Table):
+    """A sweep: which points, how each is integrated and measured, what is made of them.
+
+    Make one with `load`, `from_toml_text` or `from_dict`: they raise BadInput with one line. `grid`
+    holds each axis in normal form (`normal_form` of `axes`; seeds last), `fixed` every other
+    parameter of the model, defaults filled in, so that equal sweeps are equal values however they
+    were written.
+    """
+
+    name: Annotated[str, StringConstraints(pattern=_FOLDER_NAME, max_length=100)] = Field(
+        description="Name of the sweep, and of its folder under results/."
+    )
+    title: Line | None = Field(None, description="Heading of figures and report.")
+    model: str = Field(description="Name of the model.")
+    grid: dict[str, Any] = Field(
+        default_factory=dict,
+        validate_default=True,
+        description="Axes; their product is the list of cells, first axis slowest, seeds fastest.",
+        json_schema_extra=grid_schema(),
+    )
+    fixed: dict[str, int | float] = Field(
+        default_factory=dict,
+        validate_default=True,
+        description="Parameters of the model that are not axes.",
+        json_schema_extra=fixed_schema(),
+    )
+    integrator: Integrator = Field(default_factory=Integrator)
+    features: Features = Field(default_factory=Features)
+    reduction: Reduction = Field(default_factory=Reduction)
+    keep: Keep = Field(default_factory=Keep)
+    run: Run = Field(default_factory=Run)
+    slurm: Slurm = Field(default_factory=Slurm)
+
+    @classmethod
+    def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Self:
+        """Return the sweep of a job file, with KEY=VALUE overrides (`reading.apply_overrides`).
+
+        The module of a user's model may lie beside the job file.
+        """
+        folder = Path(path).parent
+        return cls.from_toml_text(read_text(path), overrides, where=str(path), folder=folder)
+
+    @classmethod
+    def from_toml_text(
+        cls,
+        text: str,
+        overrides: Sequence[str] = (),
+        where: str = "job file",
+        folder: Path | None = None,
+    ) -> Self:
+        """Return the sweep that TOML text describes; `where` begins the messages of errors.
+
+        The module of a user's model is looked for in `folder` too.
+        """
+        data = apply_overrides(parse_toml(text, where), overrides)
+        if folder is not None and ":" in str(data.get("model", "")):
+            look_in(folder)
+        settings = "".join(f" --set {short(override)}" for override in overrides)
+        return cls.from_dict(data, where=f"{where} with{settings}" if settings else where)
+
+    @classmethod
+    def from_dict(cls, data: Any, where: str = "sweep") -> Self:
+        """Return the sweep of plain data, such as `to_dict` gives; raise BadInput with one line."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise bad(where, one_line(error, list(cls.model_fields))) from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON, defaults filled in; `from_dict` makes it a sweep again."""
+        return self.model_dump(mode="json", exclude_none=True)
+
+    @property
+    def n_nodes(self) -> int:
+        """Nodes of the ring, N0."""
+        return int(self.fixed["n_nodes"])
+
+    @property
+    def axes(self) -> dict[str, Axis]:
+        """Axes by the name of their column, in order of declaration, `seed` last."""
+        return axes_of(parameters_of(self.model), self.grid, self.fixed)
+
+    @property
+    def seeds(self) -> range | tuple[float, ...]:
+        """Seeds in order; `keep.series = "first-seed"` means the first of them."""
+        return parse_seeds(self.grid["seeds"]).values
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of the analysis: multiples of t_step from features.start to integrator.t_end."""
+        step = self.integrator.t_step
+        first = math.ceil(self.features.start / step - 1e-9)
+        return math.floor(self.integrator.t_end / step + 1e-9) - first + 1
+
+    @property
+    def digest(self) -> str:
+        """16 hexadecimal digits: 64-bit BLAKE2b of what decides the points and their numbers.
+
+        It covers model, grid (with the order of the axes), fixed, integrator and features as
+        canonical JSON.
+        """
+        return spec_digest(self.to_dict())
+
+    def explain_difference(self, other: Sweep) -> list[str]:
+        """Return a line for each digested key that `other`, the one in the store, has otherwise."""
+        here, there = (_flat(_digested(sweep.to_dict())) for sweep in (self, other))
+        return [
+            f"{key}: {_shown(here.get(key))} here, {_shown(there.get(key))} in the store"
+            for key in {**here, **there}
+            if here.get(key) != there.get(key)
+        ]
+
+    def points(self) -> Points:
+        """Return all points: axes in order of declaration, first slowest, seed fastest."""
+        axes = self.axes
+        columns = expand(axes)
+        n_points = len(columns["seed"])
+        model = parameters_of(self.model)
+        single = {**self.fixed, **model.constants, "delta": self.integrator.delta}
+        kinds = {p.name: p.kind for p in (*model.parameters, DELTA, SEED)}
+        kinds |= dict.fromkeys(model.constants, int)
+        return Points(
+            {
+                name: columns[name].astype(DTYPES[kind], copy=False)
+                if name in columns
+                else np.full(n_points, single[name], DTYPES[kind])
+                for name, kind in kinds.items()
+            },
+            tuple(axes),
+        )
+
+    @field_validator("model")
+    @classmethod
+    def _check_model(cls, model: str) -> str:
+        parameters_of(model)
+        return model
+
+    @field_validator("grid", mode="before")
+    @classmethod
+    def _normalise_grid(cls, grid: Any, info: ValidationInfo) -> Any:
+        if not _is_table(grid) or "model" not in info.data:
+            return grid
+        return normal_grid(parameters_of(info.data["model"]), grid)
+
+    @field_validator("fixed", mode="before")
+    @classmethod
+    def _complete_fixed(cls, fixed: Any, info: ValidationInfo) -> Any:
+        if not _is_table(fixed) or not {"model", "grid"} <= set(info.data):
+            return fixed
+        return complete_fixed(parameters_of(info.data["model"]), fixed, info.data["grid"])
+
+    @model_validator(mode="after")
+    def _check_all(self) -> Self:
+        model, axes = parameters_of(self.model), self.axes
+        check_points(model, axes, self.fixed)
+        single = {name: Values((value,)) for name, value in self.fixed.items()}
+        check_tables(self.integrator, self.features, model, {**single, **axes})
+        check_nodes(self.features, self.n_nodes)
+        own = model if ":" in self.model else None
+        check_names("reduction.show", self.reduction.show, own)
+        check_names("reduction.replay", self.reduction.replay, own)
+        return self
+
+
+def spec_digest(spec: Mapping[str, Any]) -> str:
+    """Return the digest of a sweep as `Sweep.to_dict` gave it.
+
+    Of one that an earlier version of the package stored, too: keys that came since do not enter.
+    """
+    text = json.dumps(_digested(spec), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
+    data = {key: spec[key] for key in _DIGESTED}
+    if "delta" in spec["grid"]:
+        integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
+        data["integrator"] = integrator
+    return {**data, "order of axes": list(spec["grid"])}
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, dict) and all(isinstance(key, str) for key in value)
+
+
+def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return every key as table.key with its value."""
+    flat: dict[str, Any] = {}
+    for key, value in data.items():
+        inner = value if isinstance(value, dict) else {"": value}
+        flat |= {f"{key}.{name}".rstrip("."): item for name, item in inner.items()}
+    return flat
+
+
+def _shown(value: Any) -> str:
+    """Return a value as a person would write it, a long list by its ends."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, list):
+        few = value if len(value) <= 6 else [*value[:2], "...", value[-1]]
+        return f"[{', '.join(map(str, few))}]"
+    return str(value)

@@ -1,0 +1,280 @@
+"""Tables of a job beside [grid] and [fixed]: every key with its default, bounds and meaning."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    model_validator,
+)
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.registry import METHODS
+from chimera_hpc.job.selection import check_analyses, check_figures, check_selections
+
+
+def _as_tuple(value: Any) -> Any:
+    """Take a list (TOML, JSON) for a tuple: a frozen value holds no list."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _as_words(value: Any) -> Any:
+    """Take one name for a tuple of it."""
+    return (value,) if isinstance(value, str) else _as_tuple(value)
+
+
+def _names(value: Any) -> Any:
+    """Pass the naming rule or a tuple of different names."""
+    names = _as_tuple(value)
+    if names == "triplet":
+        return names
+    words = isinstance(names, tuple) and all(isinstance(n, str) and n.isprintable() for n in names)
+    if not words or not all(names) or len(set(names)) < max(2, len(names)):
+        raise BadInput(
+            f'reduction.names: {short(value)} is neither "triplet" nor a list of different names'
+        )
+    return names
+
+
+def _different(value: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(value)) < len(value):
+        raise BadInput(f"reduction.cuts: {short(value)} holds a number twice")
+    return value
+
+
+def _known_method(value: str) -> str:
+    if value not in METHODS:
+        raise BadInput(
+            f"integrator.method: {short(value)} is unknown{nearest(value, list(METHODS))}"
+        )
+    return value
+
+
+Line = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=500)]
+"""Text on one line."""
+Word = Annotated[
+    str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.,:@+-]*$", max_length=200)
+]
+"""A name that needs no quoting in a shell."""
+Texts = tuple[str, ...]
+Lines = Annotated[tuple[Line, ...], BeforeValidator(_as_tuple)]
+Count = Annotated[int, Field(ge=1, le=10**9)]
+
+
+class Table(BaseModel):
+    """Frozen; unknown keys, other types and NaN or infinity are errors."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        defer_build=True,  # building the validators is a fifth of the time of the import
+    )
+
+
+class Integrator(Table):
+    """How a point is integrated."""
+
+    method: Annotated[str, AfterValidator(_known_method)] = Field(
+        "tsit5",
+        description="Runge-Kutta pair: of order 5 (tsit5, the paper's; dopri5), 6 (verner6), "
+        "4 (kcl4, a low-storage pair).",
+        json_schema_extra={"enum": list(METHODS)},
+    )
+    form: Literal["reduced", "full"] = Field(
+        "reduced", description="Equations of nodes only (exact), or of nodes and links."
+    )
+    t_end: float = Field(1000.0, gt=0, description="End of the run; it begins at 0.")
+    t_step: float = Field(0.01, gt=0, description="Sampling step of the series.")
+    rtol: float = Field(1e-3, gt=0, description="Relative tolerance.")
+    atol: float = Field(1e-6, gt=0, description="Absolute tolerance.")
+    delta: float = Field(
+        1e-3,
+        ge=0,
+        description="Radius of the ball of initial states; an axis delta in [grid] overrides it.",
+    )
+    centre: Literal["origin", "upper", "lower"] = Field(
+        "origin",
+        description="Centre of that ball: u = v = 0, or u = +sqrt(3) or -sqrt(3) with v = -b/c.",
+    )
+    ball: Literal["maximum", "euclidean"] = Field(
+        "maximum", description="Norm of that ball; maximum: delta * U[-1, 1] for each variable."
+    )
+    max_steps: Count = Field(10_000_000, description="Accepted and rejected steps a point.")
+    time_out: float = Field(600.0, gt=0, description="Seconds of wall time a point.")
+
+
+class Features(Table):
+    """How a series becomes features."""
+
+    start: float = Field(
+        950.0, ge=0, description="Begin of the analysis; it ends at integrator.t_end."
+    )
+    n_peaks: int = Field(
+        10, ge=3, le=10**6, description="Maxima of one window, both ends included."
+    )
+    n_share: int = Field(5, ge=0, description="Maxima that consecutive windows share.")
+    clock: Literal["ring", "own"] = Field(
+        "ring", description="Windows by the maxima of one node for all, or by each node's own."
+    )
+    clock_node: int = Field(0, ge=0, description="Node whose maxima are the clock of the ring.")
+    phase_mean: Literal["circular", "arithmetic"] = Field(
+        "circular", description="Mean of the phases over windows."
+    )
+    refine: Literal["parabola", "sine-fit"] = Field(
+        "parabola", description="How the frequency of the largest line is refined."
+    )
+    time_origin: Literal["window", "absolute"] = Field(
+        "window", description="Time at which a phase is read: the window's start, or 0."
+    )
+    still: float = Field(
+        1e-2, ge=0, description="Mean standard deviation of u below which a run is steady."
+    )
+    groups: int = Field(
+        6,
+        ge=1,
+        description="Groups of nodes for the local deviations of the strength of incoherence.",
+    )
+
+    @model_validator(mode="after")
+    def _check_share(self) -> Self:
+        if self.n_share >= self.n_peaks:
+            text = f"{self.n_share} must be below features.n_peaks = {self.n_peaks}"
+            raise BadInput(f"features.n_share: {text}")
+        return self
+
+
+class Reduction(Table):
+    """How the points become classes; not part of the digest."""
+
+    linkage: Literal["ward", "average", "complete"] = Field(
+        "ward", description="Distance between clusters."
+    )
+    cuts: Annotated[
+        tuple[Annotated[int, Field(ge=2, le=1000)], ...],
+        BeforeValidator(_as_tuple),
+        AfterValidator(_different),
+    ] = Field((3, 4, 5), description="Numbers of clusters, side by side.")
+    depth: float | None = Field(
+        None, gt=0, description="Cut of the dendrogram at this distance, too."
+    )
+    names: Annotated[str | tuple[str, ...], BeforeValidator(_names)] = Field(
+        "triplet", description='The rule "triplet", or a list of names by rising V_theta.'
+    )
+    show: Annotated[Texts, BeforeValidator(check_selections("reduction.show"))] = Field(
+        (),
+        description="Points to draw over the analysis interval with their Fourier indicators, each "
+        'as "P=9 Q=9 seed=0": the first point with these values. Empty: one of each class.',
+    )
+    replay: Annotated[Texts, BeforeValidator(check_selections("reduction.replay"))] = Field(
+        (),
+        description="Points, of this sweep or not, to integrate anew and to draw from 0 to t_end; "
+        "values that are not named are those of the sweep's first point.",
+    )
+    figures: Annotated[str | Texts, BeforeValidator(check_figures)] = Field(
+        "auto", description='"auto", all that fit, or a list of the names of figures.'
+    )
+    analyses: Annotated[Texts, BeforeValidator(check_analyses)] = Field(
+        (), description="What else is made of the points, for results.json: names of analyses."
+    )
+    atlas: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
+        (),
+        description="Sweeps whose classes judge the runs: folders beside this one, or paths. The "
+        "first judges, the others are the check.",
+    )
+    beside: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
+        (), description="Sweeps whose curves are drawn with this one's: folders beside this one."
+    )
+    deltas: Annotated[tuple[Annotated[float, Field(ge=0)], ...], BeforeValidator(_as_tuple)] = (
+        Field((), description="Thresholds of the strength of incoherence.")
+    )
+    delta_unit: Literal["range", "absolute"] = Field(
+        "range", description="Unit of deltas: the range of u of each run, or the unit of u."
+    )
+
+    @model_validator(mode="after")
+    def _check_cut(self) -> Self:
+        if not self.cuts and self.depth is None:
+            text = "empty; a number of clusters is needed, or reduction.depth"
+            raise BadInput(f"reduction.cuts: {text}")
+        return self
+
+
+class Keep(Table):
+    """What of the time series stays in the store; not part of the digest."""
+
+    series: Literal["all", "first-seed", "none"] = Field(
+        "all", description="Points whose u is kept."
+    )
+    dtype: Literal["int16", "float32"] = Field(
+        "int16", description="Type of the kept u; int16 counts steps of 1e-4."
+    )
+
+
+class Run(Table):
+    """How the points are worked through; not part of the digest."""
+
+    block: int = Field(0, ge=0, le=10**8, description="Points a block; 0: chosen from the cost.")
+    workers: int = Field(0, ge=0, le=10**6, description="Worker processes; 0: one a core.")
+    attempts: int = Field(2, ge=1, le=100, description="Tries of a point that fails.")
+    tighten: float = Field(
+        0.1, gt=0, le=1, description="Factor on rtol and atol at each further try."
+    )
+    patience: float = Field(
+        60.0,
+        ge=1,
+        le=86400,
+        description="Seconds without a sign of life after which a worker counts as lost.",
+    )
+
+
+class Slurm(Table):
+    """Wishes for SLURM, passed on as they are; not part of the digest."""
+
+    partition: Word | None = Field(None, description="Partition (--partition).")
+    account: Word | None = Field(None, description="Account (--account).")
+    time: (
+        Annotated[str, StringConstraints(pattern=r"^([0-9]+-)?[0-9]+(:[0-9]{2}){0,2}$")] | None
+    ) = Field(
+        None, description="Time limit of a job: minutes, hours:minutes:seconds or days-hours."
+    )
+    mem: Annotated[str, StringConstraints(pattern=r"^[1-9][0-9]*[KMGT]?$")] | None = Field(
+        None, description="Memory of a worker, as 400M or 2G."
+    )
+    workers: Count | None = Field(None, description="Worker processes in all.")
+    array: Count | None = Field(None, description="Elements of the job array.")
+    at_once: Count | None = Field(
+        None, description="Elements of the job array that run at a time, at most."
+    )
+    setup: Lines = Field((), description="Shell lines before the work: modules, environments.")
+    extra: Lines = Field((), description="Further options of sbatch, one a line.")
+    interface: Word | None = Field(None, description="Network interface of scheduler and workers.")
+
+
+TABLES: dict[str, type[Table]] = {
+    "integrator": Integrator,
+    "features": Features,
+    "reduction": Reduction,
+    "keep": Keep,
+    "run": Run,
+    "slurm": Slurm,
+}
+
+
+def unknown_key(table: str, key: str, known: list[str]) -> str:
+    """Return the message for a key that `table` (empty: the top of the file) does not have.
+
+    It names the table that has such a key, else the nearest known key.
+    """
+    homes = {field: name for name, other in TABLES.items() for field in other.model_fields}
+    home = {**homes, "seeds": "grid"}.get(key)
+    hint = f"; it belongs in [{home}]" if home else nearest(key, known)
+    return f"{table}{'.' if table else ''}{key[:60]}: unknown key{hint}"

@@ -1,0 +1,397 @@
+"""Amplitude, frequency, phase and baseline of oscillations, window by window (the Fourier method).
+
+In a window w a signal is described by its dominant line (paper, sections ssec:Fourier and
+sec:Fourier),
+
+    y(t) ~ a0 + a cos(2 pi Omega (t - t_ref) + theta) ,
+
+found in three steps: the largest line of the amplitude spectrum 2 |X_k| / n of y - <y> (no
+padding, no taper, never bin 0); the vertex of the parabola through that line and its neighbours,
+which is Omega; the least squares of p1 cos(2 pi Omega t + p2) + p3 with Omega fixed, which is
+linear in (p1 cos p2, p1 sin p2, p3) and so needs no iteration. Mean and standard deviation over
+the windows are the features (eq:averages, eq:stds).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.jit import jit
+from chimera_hpc.measures import lines, windows
+from chimera_hpc.measures.checks import Array, floats, integer, node_rows
+
+Clock = Literal["ring", "own"]
+PhaseMean = Literal["circular", "arithmetic"]
+Refine = Literal["parabola", "sine-fit"]
+TimeOrigin = Literal["window", "absolute"]
+
+QUANTITIES = ("amplitude", "frequency", "phase", "baseline")
+FEATURES = (*QUANTITIES, *(f"{name}_std" for name in QUANTITIES))
+
+_PHASE = QUANTITIES.index("phase")
+_FREQUENCY = QUANTITIES.index("frequency")
+# Largest departure of a time from its place on the uniform grid, in steps.
+_UNIFORM = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class FourierFeatures:
+    """Means and standard deviations over windows of the lines of N signals.
+
+    All arrays have shape (N,) and are NaN unless `status` is DONE; the deviations are NaN for a
+    single window. The field names are those of `FEATURES`, in order.
+    """
+
+    amplitude: Array
+    frequency: Array  # cycles a unit of time
+    phase: Array  # rad, in [-pi, pi)
+    baseline: Array
+    amplitude_std: Array
+    frequency_std: Array
+    phase_std: Array  # rad
+    baseline_std: Array
+    n_windows: int  # of each signal; with each signal's own clock, the least over the signals
+    deviation: float  # mean over the signals of the standard deviation in time
+    status: Status  # DONE, STEADY or NO_WINDOW
+
+    def as_array(self) -> Array:
+        """The features as one array (8, N), rows in the order of `FEATURES`."""
+        return np.stack([getattr(self, name) for name in FEATURES])
+
+
+@dataclass(frozen=True, eq=False)
+class WindowLines:
+    """The lines of N signals in each of up to q windows, before any average.
+
+    `amplitude`, `frequency`, `phase` and `baseline` have shape (N, q); `first` and `last` (samples,
+    both inside the window) and `counts` have one row a clock: 1 for the ring's clock, N for each
+    signal's own. Beyond a clock's count, values are NaN and samples 0. All but
+    `deviation` are empty unless `status` is DONE.
+    """
+
+    amplitude: Array
+    frequency: Array
+    phase: Array
+    baseline: Array
+    first: windows.Samples
+    last: windows.Samples
+    counts: windows.Samples
+    deviation: float  # mean over the signals of the standard deviation in time
+    status: Status
+
+
+@dataclass(frozen=True)
+class _Recording:
+    """Checked input: N signals in rows (N, T), sampled at t[0] + dt * (0 .. T-1)."""
+
+    t: Array
+    dt: float
+    x: Array
+
+
+def fourier_features(
+    t: ArrayLike,
+    u: ArrayLike,
+    *,
+    n_peaks: int = 10,
+    n_share: int = 5,
+    clock: Clock = "ring",
+    clock_node: int = 0,
+    phase_mean: PhaseMean = "circular",
+    refine: Refine = "parabola",
+    time_origin: TimeOrigin = "window",
+    still: float = 1e-2,
+) -> FourierFeatures:
+    r"""Mean amplitude, frequency, phase and baseline of each signal, and how much they vary.
+
+    Windows run from a maximum of the clock to its (n_peaks - 1)-th next maximum, both samples
+    included; two windows in a row share n_share maxima. With q windows and Z^(w) the value of a
+    quantity in window w (eq:averages, eq:stds),
+
+        <Z> = sum_w Z^(w) / q ,        sigma_Z^2 = sum_w (Z^(w) - <Z>)^2 / (q - 1) .
+
+    Parameters
+    ----------
+    t : array_like, shape (T,)
+        Times, uniform.
+    u : array_like, shape (T, N)
+        Signals of any model or experiment. An array whose transpose is contiguous is not copied.
+    n_peaks, n_share : int
+        Maxima in a window (at least 3), and maxima shared by two windows in a row
+        (0 <= n_share < n_peaks).
+    clock : {"ring", "own"}
+        Whose maxima make the windows: those of `clock_node` for all signals, or each signal's own.
+    clock_node : int
+        Column of u (0-based) that is the ring's clock; without effect on the clock "own".
+    phase_mean : {"circular", "arithmetic"}
+        Circular: <theta> = arg sum_w exp(i theta^(w)), and the deviations from it are taken
+        around the circle, in [-pi, pi), before they are squared. Arithmetic: the two formulas
+        as they stand, on phases in [-pi, pi).
+    refine : {"parabola", "sine-fit"}
+        Three steps as in the module's text; or a least squares over frequency, amplitude, phase
+        and baseline together (four-parameter sine fit, IEEE Std 1057-2017), by Gauss-Newton steps
+        from the result of the three.
+    time_origin : {"window", "absolute"}
+        Phase at the window's first sample, or at t = 0 (for the start of the recording pass
+        t - t[0]). An absolute phase carries the error of the frequency times 2 pi t: only the
+        sine fit makes it useful far from t = 0.
+    still : float
+        Limit for the mean over signals of the standard deviation in time of u.
+
+    Returns
+    -------
+    FourierFeatures
+        Status STEADY where u varies less than `still`, else NO_WINDOW where a clock has fewer
+        than n_peaks maxima (with the clock "own": where any signal has), else DONE. Signals that
+        stand still among others that do not have amplitude, frequency and phase 0.
+
+    Raises
+    ------
+    BadInput
+        A wrong shape or option, a time step that is not uniform, a value that is not finite.
+
+    Examples
+    --------
+    >>> t = np.arange(2001) * 0.01
+    >>> u = 3 + np.stack([np.cos(2 * np.pi * t - 1), 2 * np.cos(2 * np.pi * t + 1)], axis=1)
+    >>> f = fourier_features(t, u, refine="sine-fit", time_origin="absolute")
+    >>> np.stack([f.amplitude, f.frequency, f.phase, f.baseline]).round(9)
+    array([[ 1.,  2.],
+           [ 1.,  1.],
+           [-1.,  1.],
+           [ 3.,  3.]])
+    >>> f.n_windows, f.status.name
+    (3, 'DONE')
+    """
+    _check_choice("phase_mean", phase_mean, get_args(PhaseMean))
+    found = window_lines(
+        t,
+        u,
+        n_peaks=n_peaks,
+        n_share=n_share,
+        clock=clock,
+        clock_node=clock_node,
+        refine=refine,
+        time_origin=time_origin,
+        still=still,
+    )
+    out = np.full((len(FEATURES), found.amplitude.shape[0]), np.nan)
+    n_windows = 0
+    if found.status is Status.DONE:
+        n_windows = int(found.counts.min())
+        values = np.stack([getattr(found, name) for name in QUANTITIES])
+        _average(values, found.counts, phase_mean == "circular", out)
+    rows = dict(zip(FEATURES, out, strict=True))
+    return FourierFeatures(
+        **rows, n_windows=n_windows, deviation=found.deviation, status=found.status
+    )
+
+
+def window_lines(
+    t: ArrayLike,
+    u: ArrayLike,
+    *,
+    n_peaks: int = 10,
+    n_share: int = 5,
+    clock: Clock = "ring",
+    clock_node: int = 0,
+    refine: Refine = "parabola",
+    time_origin: TimeOrigin = "window",
+    still: float = 1e-2,
+) -> WindowLines:
+    """Lines of all signals in all windows; parameters and errors as for `fourier_features`."""
+    recording = _recording(t, u)
+    n_nodes = recording.x.shape[0]
+    n_peaks, n_share = _check_windows(n_peaks, n_share)
+    clock_node = _check_node(clock_node, n_nodes)
+    _check_choice("clock", clock, get_args(Clock))
+    _check_choice("refine", refine, get_args(Refine))
+    _check_choice("time_origin", time_origin, get_args(TimeOrigin))
+    _check_still(still)
+
+    deviation = _mean_deviation(recording.x)
+    if deviation < still:
+        return _no_lines(n_nodes, deviation, Status.STEADY)
+    clocks = recording.x if clock == "own" else recording.x[clock_node : clock_node + 1]
+    first, last, counts = _place_windows(clocks, n_peaks, n_share)
+    if counts.min() == 0:
+        return _no_lines(n_nodes, deviation, Status.NO_WINDOW)
+    table = np.full((n_nodes, first.shape[1], len(QUANTITIES)), np.nan)
+    work = lines.work_arrays(int((last - first).max()) + 1)
+    bins = np.full(n_nodes, n_peaks - 1)
+    _fill_lines(recording.x, first, last, counts, bins, refine == "sine-fit", work, table)
+    values = np.ascontiguousarray(table.transpose(2, 0, 1))
+    values[_FREQUENCY] /= 2.0 * np.pi * recording.dt
+    if time_origin == "absolute":
+        values[_PHASE] -= 2.0 * np.pi * values[_FREQUENCY] * recording.t[first]
+    values[_PHASE] = wrap(values[_PHASE])
+    amplitude, frequency, phase, baseline = values
+    return WindowLines(
+        *(amplitude, frequency, phase, baseline, first, last, counts, deviation, Status.DONE)
+    )
+
+
+def wrap(angle: Array) -> Array:
+    """Angle (rad) moved into [-pi, pi)."""
+    inside = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+    return np.where(inside >= np.pi, -np.pi, np.maximum(inside, -np.pi))
+
+
+def _no_lines(n_nodes: int, deviation: float, status: Status) -> WindowLines:
+    none = np.empty((n_nodes, 0))
+    samples = np.empty((1, 0), dtype=np.int64)
+    counts = np.zeros(1, dtype=np.int64)
+    return WindowLines(none, none, none, none, samples, samples, counts, deviation, status)
+
+
+def _place_windows(
+    clocks: Array, n_peaks: int, n_share: int
+) -> tuple[windows.Samples, windows.Samples, windows.Samples]:
+    """First and last samples (C, q) of the windows of C clocks (C, T), and their counts (C,)."""
+    placed = [windows.windows(windows.maxima(x), n_peaks, n_share) for x in clocks]
+    counts = np.array([last.size for _, last in placed])
+    first = np.zeros((len(placed), counts.max()), dtype=np.int64)
+    last = np.zeros_like(first)
+    for row, (begins, ends) in enumerate(placed):
+        first[row, : begins.size] = begins
+        last[row, : ends.size] = ends
+    return first, last, counts
+
+
+# --- kernels -------------------------------------------------------------------------------------
+
+
+@jit()
+def _deviations(x: Any, work: Any, out: Any) -> None:
+    """Standard deviation (ddof 0) in time of each row of x (N, T) into out (N,)."""
+    for j in range(x.shape[0]):
+        _, energy, _ = lines.centre(x[j], 0, x.shape[1], work.z, work.sums)
+        out[j] = math.sqrt(energy / x.shape[1])
+
+
+@jit()
+def _fill_lines(
+    x: Any, first: Any, last: Any, counts: Any, bins: Any, refine: bool, work: Any, values: Any
+) -> None:
+    """Lines of each row of x (N, T) in its windows into values (N, q, 4).
+
+    Frequencies are angles a sample; phases belong to the first sample and are not wrapped. bins
+    (N,) holds a guess at the dominant bin of each row, and in the end its bin in the last window.
+    """
+    # Window by window: signals with one clock have windows of one length, whose rotations are kept.
+    for m in range(first.shape[1]):
+        for j in range(x.shape[0]):
+            c = j % counts.size
+            if m < counts[c]:
+                n = last[c, m] - first[c, m] + 1
+                bins[j] = lines.window_line(
+                    x[j], first[c, m], n, bins[j], refine, work, values[j, m]
+                )
+
+
+@jit()
+def _average(values: Any, counts: Any, circular: bool, out: Any) -> None:
+    """Means and deviations over windows of values (4, N, q) into out (8, N)."""
+    for j in range(values.shape[1]):
+        q = counts[j % counts.size]
+        for row in range(4):
+            x = values[row, j, :q]
+            around = circular and row == _PHASE
+            mean = _circular_mean(x) if around else _mean(x)
+            square = 0.0
+            for m in range(q):
+                deviation = x[m] - mean
+                if around:
+                    deviation -= 2.0 * math.pi * math.floor(0.5 * deviation / math.pi + 0.5)
+                square += deviation * deviation
+            out[row, j] = mean
+            out[row + 4, j] = math.sqrt(square / (q - 1)) if q > 1 else math.nan
+
+
+@jit()
+def _mean(x: Any) -> float:
+    """Mean of x, exact where all values are equal."""
+    origin = x[0]
+    total = 0.0
+    for m in range(x.size):
+        total += x[m] - origin
+    mean: float = origin + total / x.size
+    return mean
+
+
+@jit()
+def _circular_mean(x: Any) -> float:
+    """Direction of the mean of exp(i x), in [-pi, pi); 0 where that mean is exactly zero."""
+    along, across = 0.0, 0.0
+    for m in range(x.size):
+        along += math.cos(x[m])
+        across += math.sin(x[m])
+    mean = math.atan2(across, along)
+    return mean if mean < math.pi else -math.pi
+
+
+# --- checks --------------------------------------------------------------------------------------
+
+
+def _recording(t: ArrayLike, u: ArrayLike) -> _Recording:
+    times, rows = floats("t", t), node_rows("u", u)
+    n_times = rows.shape[1]
+    if times.shape != (n_times,):
+        raise BadInput(f"t must have shape ({n_times},), one time a row of u, not {times.shape}")
+    if n_times < 3:
+        raise BadInput(f"t must hold at least 3 times, not {n_times}")
+    dt = float(times[-1] - times[0]) / (n_times - 1)
+    if not (math.isfinite(dt) and dt > 0):
+        raise BadInput(f"t must be finite and rise, from t[0] = {times[0]} to t[-1] = {times[-1]}")
+    departure = np.abs(times - (times[0] + dt * np.arange(n_times))).max() / dt
+    if not departure <= _UNIFORM:
+        raise BadInput(
+            f"t must be uniform: a time is {departure:.3g} steps off, allowed is {_UNIFORM:g}"
+        )
+    return _Recording(times, dt, rows)
+
+
+def _mean_deviation(x: Array) -> float:
+    """Mean over signals of the standard deviation in time; BadInput where u isn't finite."""
+    deviations = np.empty(x.shape[0])
+    _deviations(x, lines.work_arrays(x.shape[1]), deviations)
+    if not np.isfinite(deviations).all():
+        node = int(np.flatnonzero(~np.isfinite(deviations))[0])
+        raise BadInput(f"u must be finite, its squares too: node {node} (column of u) is not")
+    return float(deviations.mean())
+
+
+def _check_windows(n_peaks: int, n_share: int) -> tuple[int, int]:
+    n_peaks, n_share = integer("n_peaks", n_peaks), integer("n_share", n_share)
+    if n_peaks < 3:
+        raise BadInput(f"n_peaks must be at least 3, not {n_peaks}")
+    if not 0 <= n_share < n_peaks:
+        raise BadInput(f"n_share must be in 0 .. n_peaks - 1 = {n_peaks - 1}, not {n_share}")
+    return n_peaks, n_share
+
+
+def _check_node(clock_node: int, n_nodes: int) -> int:
+    clock_node = integer("clock_node", clock_node)
+    if not 0 <= clock_node < n_nodes:
+        raise BadInput(f"clock_node must be in 0 .. {n_nodes - 1}, not {clock_node}")
+    return clock_node
+
+
+def _check_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise BadInput(f"{name} must be one of {', '.join(allowed)}, not {value!r}")
+
+
+def _check_still(still: float) -> None:
+    if not 0.0 <= still < math.inf:
+        raise BadInput(f"still must be a finite number >= 0, not {still}")
+
+
+assert tuple(f.name for f in fields(FourierFeatures))[: len(FEATURES)] == FEATURES

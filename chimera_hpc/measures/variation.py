@@ -1,0 +1,84 @@
+"""Total normalised variations: how ragged phase, amplitude and frequency are along the ring."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.base.errors import BadInput
+
+Array = NDArray[np.float64]
+
+
+class Profiles(Protocol):
+    """Anything that holds mean phase (rad), amplitude and frequency of each node, each (N,)."""
+
+    @property
+    def phase(self) -> Array: ...
+    @property
+    def amplitude(self) -> Array: ...
+    @property
+    def frequency(self) -> Array: ...
+
+
+def total_variations(features: Profiles) -> tuple[float, float, float]:
+    """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, section ssec:TNVar).
+
+    As `total_variation_arrays`, for an object with the attributes phase, amplitude and frequency.
+    NaN where the features are, which is where their status is not DONE.
+    """
+    return total_variation_arrays(features.phase, features.amplitude, features.frequency)
+
+
+def total_variation_arrays(
+    phase: ArrayLike, amplitude: ArrayLike, frequency: ArrayLike, *, ring: bool = True
+) -> tuple[float, float, float]:
+    r"""Total normalised variations of three profiles along a ring of N nodes.
+
+        V_theta = sum_i min(v_i, 2 pi - v_i) / (pi N) ,   v_i = |theta_{i+1} - theta_i| ,
+        V_a     = sum_i |a_{i+1} - a_i| / N ,
+        V_Omega = sum_i |Omega_{i+1} - Omega_i| / N ,
+
+    with node N+1 the first one (paper, section ssec:TNVar). V_theta takes v_i modulo 2 pi first,
+    so phases need not lie in one turn; it is in [0, 1]. V_a has the unit of the signal, V_Omega
+    that of the frequency.
+
+    Parameters
+    ----------
+    phase, amplitude, frequency : array_like, shape (N,)
+        Phase in rad.
+    ring : bool
+        Without it the nodes are a chain: node N has no next one, and the N - 1 differences are
+        divided by N - 1, so that V stays the mean over pairs of neighbours.
+
+    Raises
+    ------
+    BadInput
+        Shapes that differ, or that are not (N,) with N >= 1; for a chain N >= 2.
+
+    Examples
+    --------
+    >>> v = total_variation_arrays([0.0, np.pi / 2, np.pi], [1.0, 3.0, 2.0], [4.0, 4.0, 1.0])
+    >>> v  # (1/2 + 1/2 + 1) / 3, (2 + 1 + 1) / 3, (0 + 3 + 3) / 3
+    (0.666667, 1.333333, 2.0)
+    """
+    profiles = [np.asarray(x, dtype=np.float64) for x in (phase, amplitude, frequency)]
+    shapes = {x.shape for x in profiles}
+    if len(shapes) > 1 or profiles[0].ndim != 1 or profiles[0].size == 0:
+        raise BadInput(
+            "phase, amplitude and frequency must have one shape (nodes,), not "
+            + ", ".join(str(x.shape) for x in profiles)
+        )
+    if not ring and profiles[0].size < 2:
+        raise BadInput("a chain has at least two nodes")
+    pairs = slice(None) if ring else slice(-1)
+    v_phase, v_amplitude, v_frequency = (np.abs(np.roll(x, -1) - x)[pairs] for x in profiles)
+    v_phase %= 2.0 * np.pi
+    v_phase = np.minimum(v_phase, 2.0 * np.pi - v_phase)
+    return (
+        float(v_phase.mean() / np.pi),
+        float(v_amplitude.mean()),
+        float(v_frequency.mean()),
+    )

@@ -1,0 +1,288 @@
+"""A user's own model, from a right-hand side and a few names: what ``model = "module:object"`` is.
+
+The module that a job names holds an `OwnModel`. From it come the axes that the job may have, the
+random initial states, and one `OwnPoint` for each point, which is all that the integrator, the
+store and the executors ask for.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.integrate.jit import compile_anew
+from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
+from chimera_hpc.models.parameters import Limit, ModelParameters, Parameter
+
+__all__ = ["Limit", "OwnModel", "OwnPoint", "Parameter"]
+
+Array: TypeAlias = NDArray[np.float64]
+Row: TypeAlias = Mapping[str, int | float]
+Prepare: TypeAlias = Callable[[Row, int], ArrayLike]
+Initial: TypeAlias = Callable[[np.random.Generator, Row, int], ArrayLike]
+Observe: TypeAlias = Callable[[Array], tuple[ArrayLike, ArrayLike]]
+
+ARGUMENTS = ("y", "dy", "p", "ints")
+"""Arguments of a right-hand side; their names are free, their order is not."""
+
+
+class OwnModel:
+    r"""A model of N oscillators with n variables each, \dot y = f(y; p).
+
+    The right-hand side is a plain function with one signature. It works on several runs at once,
+    its *lanes*, which differ in state and real parameters and share the integers:
+
+        def rhs(y, dy, p, ints):
+            n = ints[0]
+            for lane in range(y.shape[1]):
+                for i in range(n):
+                    dy[i, lane] = p[0, lane] - y[i, lane]
+
+    Row ``v * n_nodes + i`` of ``y`` and ``dy`` is variable v of node i. The model compiles it with
+    numba: strict IEEE arithmetic, no memory allocated inside, nothing kept on disk, so that a
+    process always runs the source as it is.
+
+    Parameters
+    ----------
+    right_hand_side : function (y, dy, p, ints)
+        ``y``, ``dy`` (n_variables * n_nodes, lanes) and ``p`` (n_p, lanes) are float64, ``ints`` is
+        int64. It fills all of ``dy`` and changes nothing else. A function that is jitted already is
+        compiled anew from its source.
+    variables : sequence of str
+        Names of the variables of a node.
+    parameters : sequence of Parameter
+        What a job may set in [grid] or [fixed], with defaults and bounds. Unless ``reals`` or
+        ``integers`` say otherwise, the real ones are the rows of ``p`` and the integer ones follow
+        n_nodes in ``ints``, both in this order.
+    n_nodes : int
+        Number of nodes where a job doesn't say.
+    initial : function (rng, row, n_nodes) -> (n_variables, n_nodes), optional
+        Initial state from a `numpy.random.Generator` and the point's parameters by name (``delta``
+        and ``seed`` included). Default: every variable uniform in the ball of ``integrator.delta``
+        around 0.
+    observed : (name, name), name, or function (state) -> (u, w), optional
+        The signal u that is stored and measured, and a second one w for portraits and the order
+        parameter; ``state`` is (n_variables, n_nodes, times), u and w are (n_nodes, times).
+        Default: the first two variables; with a single name w is u.
+    reals : function (row, n_nodes) -> (n_p,), optional
+        The column of ``p`` of a run: numbers prepared once, such as cosines or a matrix of weights.
+    integers : function (row, n_nodes) -> (k,), optional
+        What follows n_nodes in ``ints``: shapes and lists of neighbours of any network.
+    limits : sequence of Limit, optional
+        Bounds of one parameter by others, checked for every point of a plan.
+
+    Raises
+    ------
+    BadInput
+        Names that are wrong or double, a function with other arguments.
+    """
+
+    def __init__(
+        self,
+        right_hand_side: Callable[..., Any],
+        *,
+        variables: Sequence[str],
+        parameters: Sequence[Parameter] = (),
+        n_nodes: int = 50,
+        initial: Initial | None = None,
+        observed: str | tuple[str, str] | Observe | None = None,
+        reals: Prepare | None = None,
+        integers: Prepare | None = None,
+        limits: Sequence[Limit] = (),
+    ) -> None:
+        self.function: Any = getattr(right_hand_side, "py_func", right_hand_side)
+        self.variables = tuple(variables)
+        self.initial, self.reals, self.integers = initial, reals, integers
+        _check_names(self.variables, parameters)
+        _check_arguments("right_hand_side", self.function, ARGUMENTS)
+        _check_arguments("initial", initial, ("rng", "row", "n_nodes"))
+        for name, function in (("reals", reals), ("integers", integers)):
+            _check_arguments(name, function, ("row", "n_nodes"))
+        self.observed = self._observed(observed)
+        self.parameters = ModelParameters(
+            n_nodes=Parameter("n_nodes", int, n_nodes, "Number of nodes.", low=3, high=10**7),
+            parameters=tuple(parameters),
+            limits=tuple(limits),
+        )
+
+    def _observed(self, observed: str | tuple[str, str] | Observe | None) -> Observe:
+        if callable(observed):
+            _check_arguments("observed", observed, ("state",))
+            return observed
+        names = (observed,) if isinstance(observed, str) else observed or self.variables[:2]
+        for name in names:
+            if name not in self.variables:
+                raise BadInput(f"observed: {name!r} is none of {', '.join(self.variables)}")
+        first, second = self.variables.index(names[0]), self.variables.index(names[-1])
+        return lambda state: (state[first], state[second])
+
+    def build(self, sweep: Any, row: Row) -> OwnPoint:
+        """Return the model of one point, from its row of columns."""
+        n_nodes = int(sweep.n_nodes)
+        named = self.parameters.parameters
+        reals: Any = [row[p.name] for p in named if p.kind is float]
+        integers: Any = [row[p.name] for p in named if p.kind is int]
+        if self.reals is not None:
+            reals = self.reals(row, n_nodes)
+        if self.integers is not None:
+            integers = self.integers(row, n_nodes)
+        return OwnPoint(
+            own=self,
+            name=sweep.model,
+            n_nodes=n_nodes,
+            row=row,
+            lane_params=_flat("reals", reals, np.float64),
+            int_params=np.concatenate([[n_nodes], _flat("integers", integers, np.int64)]),
+        )
+
+    @cached_property
+    def compiled(self) -> Any:
+        """The right-hand side, compiled when first asked for.
+
+        Raises
+        ------
+        BadInput
+            It doesn't compile, or calls a function that numba keeps on disk and would take from
+            there after an edit of what that function calls.
+        """
+        for helper in _helpers(self.function):
+            # numba looks at the date of the helper's own file, not at what the helper calls.
+            if type(helper._cache).__name__ != "NullCache":
+                raise BadInput(
+                    f"right_hand_side calls {helper.__name__}, which is compiled with cache=True: "
+                    "leave that out, or an edit may go unnoticed"
+                )
+        try:
+            return compile_anew(RIGHT_HAND_SIDE, self.function)
+        except Exception as error:
+            # Whatever numba says of the user's code.
+            raise BadInput(f"right_hand_side does not compile: {_in_short(error)}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class OwnPoint:
+    """A user's model with the parameters of one point; it has what `protocol.Model` lists."""
+
+    own: OwnModel
+    name: str
+    n_nodes: int
+    row: Row
+    lane_params: Array
+    int_params: NDArray[np.int64]
+
+    @property
+    def n_rows(self) -> int:
+        """Number of integrated variables."""
+        return len(self.own.variables) * self.n_nodes
+
+    @property
+    def n_second(self) -> int:
+        """Number of variables beside the first of each node."""
+        return self.n_rows - self.n_nodes
+
+    @property
+    def lane_group(self) -> tuple[Any, ...]:
+        """What trajectories must share to run as lanes of one kernel call."""
+        return (self.name, self.int_params.tobytes(), len(self.lane_params))
+
+    @property
+    def right_hand_side(self) -> Any:
+        """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
+        return self.own.compiled
+
+    def draw(self, stream: np.random.Generator) -> tuple[Array, Array] | None:
+        """Draw the initial state as the model says: first variable, others; None if it doesn't."""
+        if self.own.initial is None:
+            return None
+        state = np.asarray(self.own.initial(stream, self.row, self.n_nodes), dtype=np.float64)
+        wanted = (len(self.own.variables), self.n_nodes)
+        if state.shape != wanted:
+            raise BadInput(f"initial gives {state.shape} where (n_variables, n_nodes) is {wanted}")
+        return state[0], state[1:].ravel()
+
+    def state(self, u: Array, v: Array) -> Array:
+        """Integrated variables of a state: first variable (N,), all others."""
+        return np.concatenate([u, v])
+
+    def node_pair(self, rows: Array) -> tuple[Array, Array]:
+        """The observed signals u and w, both (N, ...), from rows (n_rows, ...)."""
+        shape = (len(self.own.variables), self.n_nodes, *rows.shape[1:])
+        u, w = self.own.observed(rows.reshape(shape))
+        return np.asarray(u, dtype=np.float64), np.asarray(w, dtype=np.float64)
+
+    def second_variable(self, rows: Array, v0: Array, t: Array) -> Array:
+        """The variables beside the first of each node, shape (T, n_second)."""
+        return rows[self.n_nodes :].T
+
+    def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]:
+        """State that initial conditions are drawn around; only the origin is known."""
+        if which != "origin":
+            raise BadInput(f'integrator.centre = "{which}": a user\'s model knows "origin" only')
+        return 0.0, 0.0
+
+
+def _check_names(variables: tuple[str, ...], parameters: Sequence[Parameter]) -> None:
+    named: dict[str, Sequence[Any]] = {
+        "variables": variables,
+        "parameters": [p.name for p in parameters],
+    }
+    for kind, names in named.items():
+        wrong = [name for name in names if not (isinstance(name, str) and name.isidentifier())]
+        if wrong or len(set(names)) < len(names):
+            raise BadInput(f"{kind}: {', '.join(map(str, names))}: different names are needed")
+    taken = {p.name for p in parameters} & {"n_nodes", "seed", "seeds", "delta"}
+    if taken:
+        raise BadInput(f"parameters: {', '.join(sorted(taken))}: every sweep has that already")
+    if not variables:
+        raise BadInput("variables: a node has at least one")
+
+
+def _check_arguments(name: str, function: Any, wanted: tuple[str, ...]) -> None:
+    if function is None:
+        return
+    if not callable(function):
+        raise BadInput(f"{name}: a function ({', '.join(wanted)}) is needed, not {function!r}")
+    found = inspect.signature(function).parameters.values()
+    plain = [p for p in found if p.kind is p.POSITIONAL_OR_KEYWORD and p.default is p.empty]
+    if len(plain) != len(wanted) or len(plain) < len(found):
+        given = ", ".join(map(str, found))
+        raise BadInput(f"{name} takes ({given}) where ({', '.join(wanted)}) is needed")
+
+
+def _flat(name: str, values: ArrayLike, kind: type[Any]) -> NDArray[Any]:
+    found = np.asarray(values)
+    numbers = found.ndim == 1 and (found.dtype.kind in "iuf" or found.size == 0)
+    if not (numbers and np.isfinite(found).all() and np.array_equal(found.astype(kind), found)):
+        what = "integers" if kind is np.int64 else "real numbers"
+        raise BadInput(f"{name} must be a list of finite {what}, not {found.dtype} {found.shape}")
+    return found.astype(kind)
+
+
+def _helpers(function: Any, known: set[int] | None = None) -> Iterator[Any]:
+    """Yield the jitted functions that a function calls, directly or through one another."""
+    known = set() if known is None else known
+    names = inspect.getclosurevars(function)
+    for value in (*names.globals.values(), *names.nonlocals.values()):
+        if hasattr(value, "py_func") and hasattr(value, "_cache") and id(value) not in known:
+            known.add(id(value))
+            yield value
+            yield from _helpers(value.py_func, known)
+
+
+def _in_short(error: Exception) -> str:
+    """Return what matters of an error of numba on one line."""
+    noise = ("Failed in nopython mode", "During:", "Enable logging", "<source", "^")
+    lines = [line.strip() for line in str(error).splitlines()]
+    lines = [line for line in lines if line and not line.startswith(noise)]
+    text = " ".join(" ".join(lines).split())
+    if "_nrt" in text or "NRT" in text:
+        text = "it makes arrays; use rows of p, or numbers, instead"
+    name = type(error).__name__
+    return f"{name}: {text if len(text) <= 300 else text[:297] + '...'}"

@@ -1,0 +1,66 @@
+"""What the integrator, the task and a job ask of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.models.parameters import ModelParameters
+
+Array: TypeAlias = NDArray[np.float64]
+Row: TypeAlias = Mapping[str, int | float]
+"""Parameters of one point by name, the seed among them."""
+
+
+class Model(Protocol):
+    """What the integrator and the task ask of a model with its parameters.
+
+    ``right_hand_side`` is compiled with the signature `integrate.stepper.RIGHT_HAND_SIDE` and works
+    on (rows, lanes); ``int_params`` are shared by the lanes of a call, ``lane_params`` is one
+    lane's column. The first ``n_nodes`` rows are the observed signal u.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def n_nodes(self) -> int: ...
+    @property
+    def n_rows(self) -> int: ...
+    @property
+    def n_second(self) -> int: ...
+    @property
+    def lane_group(self) -> tuple[Any, ...]: ...
+    @property
+    def right_hand_side(self) -> Any: ...
+    @property
+    def int_params(self) -> NDArray[np.int64]: ...
+    @property
+    def lane_params(self) -> Array: ...
+    def state(self, u: Array, v: Array) -> Array: ...
+    def node_pair(self, rows: Array) -> tuple[Array, Array]: ...
+    def second_variable(self, rows: Array, v0: Array, t: Array) -> Array: ...
+    def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]: ...
+
+
+class ModelKind(Protocol):
+    """A model before its parameters are known: what the registry and a job's ``model`` name."""
+
+    @property
+    def parameters(self) -> ModelParameters: ...
+    def build(self, sweep: Any, row: Row) -> Model: ...
+
+
+@dataclass(frozen=True)
+class BuiltIn:
+    """A model of this package: its table of parameters, and what builds it for one point."""
+
+    parameters: ModelParameters
+    builder: Callable[[Any, Row], Model]
+
+    def build(self, sweep: Any, row: Row) -> Model:
+        """Return the model of one point, from its row of columns."""
+        return self.builder(sweep, row)

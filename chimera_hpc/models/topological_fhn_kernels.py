@@ -1,0 +1,134 @@
+"""Compiled right-hand sides of the topological FitzHugh-Nagumo model on a ring."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from chimera_hpc.integrate.jit import jit
+from chimera_hpc.integrate.simd import (
+    LANES,
+    fma,
+    last_of,
+    load,
+    load_at,
+    load_some,
+    splat,
+    store,
+    store_at,
+    store_some,
+)
+from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
+from chimera_hpc.models.window_sums import (
+    changes_along,
+    first_across,
+    first_along,
+    rest_across,
+    stride_across,
+)
+
+THIRD = 1.0 / 3.0
+
+
+@jit()
+def _activator(u: Any, w: Any, rate: Any) -> Any:
+    # With the signs turned: (u^3 / 3 - u + w) * -rate.
+    return fma(u, fma(u * u, THIRD, -1.0), w) * (-1.0 * rate)
+
+
+@jit()
+def _recovery(u: Any, w: Any, source: Any, total: Any, width: Any, c: Any) -> Any:
+    return fma(c, w, source) - fma(-width, u, total)
+
+
+# (L0 u)_i = (2P + 1) u_i - sum_{|k| <= P} u_{i+k}, the sum being that of a sliding window.
+
+
+@jit()
+def _node(zero: Any, i: Any, total: Any, context: Any) -> None:
+    y, dy, params, n, width, c, rate = context
+    u, w = load(zero, y, i), load(zero, y, n + i)
+    store(dy, i, _activator(u, w, rate))
+    store(dy, n + i, _recovery(u, w, load(zero, params, 2 + i), total, width, c))
+
+
+@jit()
+def _reduced_across(zero: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
+    # Node by node, in all lanes together.
+    n, half = ints[0], ints[1]
+    rate, c = load(zero, params, 0), load(zero, params, 1)
+    context = (y, dy, params, n, 2.0 * half + 1.0, c, rate)
+    total = first_across(zero, y, 0, n, half)
+    for i in range(0, n - LANES + 1, LANES):
+        total = stride_across(zero, y, 0, n, half, total, i, _node, context)
+    rest_across(zero, y, 0, n, half, total, _node, context)
+
+
+@jit()
+def _reduced_along(y: Any, dy: Any, params: Any, ints: Any) -> None:
+    # One trajectory, eight nodes at a time.
+    n, half = ints[0], ints[1]
+    rate, c = params[0, 0], params[1, 0]
+    width = 2.0 * half + 1.0
+    before = first_along(y, 0, n, half)
+    for i in range(0, n, 8):
+        x = changes_along(y, 0, n, half, i)
+        total = before + x
+        before = before + last_of(x)
+        if i + 8 <= n:
+            u, w = load_at(y, i), load_at(y, n + i)
+            source = load_at(params, 2 + i)
+            store_at(dy, i, _activator(u, w, rate))
+            store_at(dy, n + i, _recovery(u, w, source, total, width, c))
+        else:
+            u, w = load_some(y, i, 0, n - i), load_some(y, n + i, 0, n - i)
+            source = load_some(params, 2 + i, 0, n - i)
+            store_some(dy, i, _activator(u, w, rate), n - i)
+            store_some(dy, n + i, _recovery(u, w, source, total, width, c), n - i)
+
+
+@jit()
+def _full(like: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
+    # Rows of y: u (n), then v of link i * P + (k - 1) between i and i + k; its orientation is the
+    # sign in params: +1 when i is the tail.
+    n, half = ints[0], ints[1]
+    rate, b, c = load(like, params, 0), load(like, params, 1), load(like, params, 2)
+    for i in range(n):
+        u = load(like, y, i)
+        store(dy, i, u - u * u * u * THIRD)
+    for i in range(n):
+        for k in range(1, half + 1):
+            j = i + k if i + k < n else i + k - n
+            link = i * half + k - 1
+            sign = load(like, params, 3 + link)
+            v = load(like, y, n + link)
+            store(dy, j, load(like, dy, j) - sign * v)
+            store(dy, i, load(like, dy, i) + sign * v)
+            flow = sign * (load(like, y, j) - load(like, y, i))
+            store(dy, n + link, b + c * v + flow)
+    for i in range(n):
+        store(dy, i, load(like, dy, i) * rate)
+
+
+def reduced_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
+    """Right-hand side of the reduced form; ``lane_params`` rows: 1/epsilon, c, b s_1 ... b s_N."""
+    if y.shape[1] == LANES:
+        _reduced_across(splat(0.0), y, dy, lane_params, int_params)
+    elif int_params[0] >= LANES:
+        _reduced_along(y, dy, lane_params, int_params)
+    else:
+        _reduced_across(0.0, y, dy, lane_params, int_params)
+
+
+def full_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
+    """Right-hand side of the node-link form; ``lane_params`` rows: 1/epsilon, b, c, link signs."""
+    if y.shape[1] == LANES:
+        _full(splat(0.0), y, dy, lane_params, int_params)
+    else:
+        _full(0.0, y, dy, lane_params, int_params)
+
+
+@cache
+def compiled(form: str) -> Any:
+    """Return the compiled right-hand side of a form, "reduced" or "full"."""
+    return jit(RIGHT_HAND_SIDE)(reduced_rhs if form == "reduced" else full_rhs)

@@ -1,0 +1,1 @@
+"""Networks: nodes, oriented links, and the matrices of their incidence."""

@@ -1,0 +1,79 @@
+"""What the figures of a sweep are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.classify.classification import Classification
+from chimera_hpc.measures import FEATURES as LABELS
+
+Array = NDArray[np.float64]
+
+_PERIODS = 12
+"""Periods in the close-up of a run."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run to draw."""
+
+    place: str
+    """Parameters and seed."""
+    t: Array
+    """(T,) uniform"""
+    u: Array
+    """(T, N)"""
+    class_name: str = ""
+    features: Array | None = None
+    """(8, N) in the order of `features.FEATURES`; None where the run has none."""
+    triplet: Array | None = None
+    """(3,) V_theta, V_a, V_Omega; None where the run has none."""
+
+    @property
+    def title(self) -> str:
+        """Place and class, a line each."""
+        return "\n".join(filter(None, [self.place, self.class_name]))
+
+    @property
+    def frequency(self) -> float:
+        """Median over the nodes, NaN without features."""
+        if self.features is None:
+            return float("nan")
+        return float(np.median(self.features[LABELS.index("frequency")]))
+
+    @property
+    def close_up(self) -> float:
+        """Time of the last twelve periods, at most half of the series."""
+        half = 0.5 * float(self.t[-1] - self.t[0])
+        return min(_PERIODS / self.frequency, half) if self.frequency > 0.0 else half
+
+    @property
+    def is_fast(self) -> bool:
+        """Whether twelve periods take less than half of the series: drawn whole, it blurs."""
+        return self.close_up < 0.5 * float(self.t[-1] - self.t[0])
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that figures of a sweep are drawn from; n points in n_cells cells."""
+
+    classification: Classification
+    triplets: Array
+    """(n, 3) V_theta, V_a, V_Omega"""
+    axes: Sequence[tuple[str, NDArray[Any]]]
+    """Label and value in each cell (n_cells,) of what varies between cells."""
+    cells: Mapping[int, Sequence[Mapping[str, Any]]]
+    """For each cut its cells (n_cells,) with ``class`` and ``votes``."""
+    curves: Mapping[str, Any] = field(default_factory=dict)
+    """What analyses made, as in results.json."""
+    beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """``curves`` of the sweeps that are drawn with this one, by their names."""
+    shown: Sequence[Run] = ()
+    """Runs over the analysis interval."""
+    whole: Sequence[Run] = ()
+    """Runs from t = 0 to the end."""

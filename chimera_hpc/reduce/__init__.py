@@ -1,1 +1,0 @@
-"""From features of runs to classes, curves and results: reads arrays, never simulates."""

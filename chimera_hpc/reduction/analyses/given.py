@@ -1,0 +1,86 @@
+"""What an analysis may look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.classification import Classification, Cut
+from chimera_hpc.classify.modes import NO_WINDOW, STEADY, run_names
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.reduction.results import TRIPLET
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Given:
+    """A finished sweep; n points in n_cells cells."""
+
+    sweep: Sweep
+    points: Points
+    status: NDArray[np.int64]
+    """(n,)"""
+    scalars: Mapping[str, Array]
+    """By name, each (n,)."""
+    classification: Classification
+    cut: Cut
+    """The cut whose classes stand for this sweep's own."""
+    atlases: Mapping[str, Atlas] = field(default_factory=dict)
+    """Those of ``reduction.atlas`` by the name of their sweep, the first judges."""
+    series: Callable[[int], tuple[Array, Array]] | None = None
+    """Time (T,) and u (T, N) of a point by its index."""
+
+    @cached_property
+    def triplets(self) -> Array:
+        """V_theta, V_a, V_Omega, shape (n, 3)."""
+        return np.stack([self.scalars[name] for name in TRIPLET], axis=1)
+
+    @cached_property
+    def has_result(self) -> NDArray[np.bool_]:
+        """Whether a point has a result, shape (n,)."""
+        return np.isin(self.status, [code for code in Status if code.is_result])
+
+    @cached_property
+    def cell(self) -> NDArray[np.int64]:
+        """Number of each point's cell, shape (n,)."""
+        return self.points.cells()[0]
+
+    @cached_property
+    def cells(self) -> dict[str, NDArray[Any]]:
+        """The columns but the seed, each (n_cells,)."""
+        return self.points.cells()[1]
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return len(next(iter(self.cells.values())))
+
+    def place(self, cell: int) -> dict[str, Any]:
+        """Coordinates of a cell."""
+        return {name: column[cell].item() for name, column in self.cells.items()}
+
+    def local_sigma(self) -> Array:
+        """Local deviations sigma(m), shape (n, groups)."""
+        groups = self.sweep.features.groups
+        return np.stack([self.scalars[f"local_sigma_{m + 1}"] for m in range(groups)], axis=1)
+
+    def own_names(self) -> list[str | None]:
+        """Class of each run by the sweep's own tree; ``steady``, ``no_window``, None as well."""
+        return run_names(self.cut.labels, self.status, self.cut.names)
+
+    def judged_names(self, atlas: Atlas) -> list[str | None]:
+        """Class of each run by an atlas; ``steady``, ``no_window``, None as well."""
+        names: list[str | None] = list(atlas.classify(self.triplets).name)
+        others = {Status.STEADY: STEADY, Status.NO_WINDOW: NO_WINDOW}
+        return [
+            name if code == Status.DONE else others.get(Status(code))
+            for name, code in zip(names, self.status.tolist(), strict=True)
+        ]

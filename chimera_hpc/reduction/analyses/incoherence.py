@@ -1,0 +1,187 @@
+"""Analyses of the differences of neighbours: SI, discontinuity measure, sigma_l, agreement."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.classify.agreement import classes_by_incoherence, confusion
+from chimera_hpc.classify.density import DensityClasses, density_classes, stable_bandwidths
+from chimera_hpc.classify.naming import CLASSES, STEADY
+from chimera_hpc.measures.incoherence import discontinuity_measure, strength_of_incoherence
+from chimera_hpc.reduction.analyses.given import Given
+from chimera_hpc.reduction.analyses.judged import most_frequent
+
+Array = NDArray[np.float64]
+_CURVE = np.geomspace(1e-4, 1.0, 81)
+
+
+def incoherence(given: Given) -> dict[str, Any]:
+    """SI and discontinuity measure for ``reduction.deltas``, and SI against delta as a curve.
+
+    Under both units of delta: ``range``, a fraction of the range of u of each run, and
+    ``absolute``. For each delta a row a cell: median and mean SI, SI of every seed, mean
+    discontinuity measure, share of runs with SI = 0, between, and 1, and the modal of these three
+    classes. A run without a result is left out.
+    """
+    spec = given.sweep.reduction
+    return {
+        "unit": spec.delta_unit,
+        "groups": given.sweep.features.groups,
+        "deltas": list(spec.deltas),
+        "cells": [given.place(i) for i in range(given.n_cells)],
+        **{unit: _by_unit(given, unit) for unit in ("range", "absolute")},
+    }
+
+
+def _by_unit(given: Given, unit: str) -> dict[str, Any]:
+    local, scale = given.local_sigma(), unit_of(given, unit)
+    curve = np.stack([_strength(local, scale, delta) for delta in _CURVE], axis=1)
+    return {
+        "by_delta": [_at_delta(given, local, scale, d) for d in given.sweep.reduction.deltas],
+        "curve": {
+            "delta": _CURVE,
+            "mean": [_mean(curve[_runs(given, i)], 0) for i in range(given.n_cells)],
+        },
+    }
+
+
+def unit_of(given: Given, unit: str) -> Array:
+    """What a delta is multiplied with for each run, shape (n,)."""
+    return given.scalars["range_u"] if unit == "range" else np.ones(len(given.status))
+
+
+def _strength(local: Array, scale: Array, delta: float) -> Array:
+    made: Array = np.full(len(local), np.nan)
+    known = np.isfinite(scale)
+    made[known] = strength_of_incoherence(local[known], delta * scale[known])
+    return made
+
+
+def _at_delta(given: Given, local: Array, scale: Array, delta: float) -> dict[str, Any]:
+    strength = _strength(local, scale, delta)
+    known = np.isfinite(scale)
+    jumps = np.full(len(local), np.nan)
+    jumps[known] = discontinuity_measure(local[known], delta * scale[known])
+    rows = []
+    for i in range(given.n_cells):
+        runs = _runs(given, i)
+        votes = Counter(classes_by_incoherence(strength[runs]))
+        rows.append(
+            {
+                "median": float(np.median(strength[runs])) if len(runs) else None,
+                "mean": float(_mean(strength[runs])),
+                "runs": strength[runs],
+                "discontinuity": float(_mean(jumps[runs])),
+                "shares": {name: votes[name] / max(len(runs), 1) for name in CLASSES},
+                "class": most_frequent(votes),
+            }
+        )
+    return {"delta": delta, "rows": rows}
+
+
+def _runs(given: Given, cell: int) -> NDArray[np.int64]:
+    return np.flatnonzero((given.cell == cell) & given.has_result)
+
+
+def _mean(values: Array, axis: int | None = None) -> Any:
+    return values.mean(axis=axis) if len(values) else np.full(values.shape[1:], np.nan)
+
+
+def sigma_l(given: Given) -> dict[str, Any]:
+    """Classes of sigma_1 by the modes of its kernel density (paper fig:sigmal).
+
+    The number of classes is the density's own at Silverman's bandwidth; ``bandwidths_of_three`` is
+    the interval of bandwidths with three modes.
+    """
+    made = density_by_sigma(given)
+    values = _sigma(given)
+    rows = []
+    for i in range(given.n_cells):
+        labels = made.labels[_runs(given, i)]
+        votes = Counter(made.names[k] for k in labels if k >= 0)
+        modal = max(votes, key=lambda name: (votes[name], -made.names.index(name)), default=None)
+        rows.append({**given.place(i), "class": modal, "votes": dict(votes)})
+    return {
+        "n_classes": len(made.names),
+        "names": made.names,
+        "bandwidth": made.bandwidth,
+        "bandwidths_of_three": stable_bandwidths(values, 3),
+        "modes": made.modes,
+        "cuts": made.cuts,
+        "grid": made.grid,
+        "density": made.density,
+        "values": values,
+        "cell_of_run": given.cell,
+        "labels": made.labels,
+        "cells": rows,
+    }
+
+
+def _sigma(given: Given) -> Array:
+    return np.where(given.has_result, given.scalars["sigma_1"], np.nan)
+
+
+def density_by_sigma(given: Given) -> DensityClasses:
+    """Density classes of sigma_1 over the runs with a result."""
+    return density_classes(_sigma(given))
+
+
+def agreement(given: Given) -> dict[str, Any]:
+    """Triplets, SI (first of ``reduction.deltas``) and sigma_1 on the same runs and cells.
+
+    Steady runs count as ordered. Runs count one by one in the confusion matrices; ``differing``
+    lists the cells whose modal classes are not all equal.
+    """
+    triplet = ["ordered" if n == STEADY else n for n in given.own_names()]
+    scale = unit_of(given, given.sweep.reduction.delta_unit)
+    delta = given.sweep.reduction.deltas[0]
+    strength = _strength(given.local_sigma(), scale, delta)
+    by_strength: list[str | None] = list(classes_by_incoherence(np.nan_to_num(strength)))
+    density = density_by_sigma(given)
+    by_density = [density.names[k] if k >= 0 else None for k in density.labels]
+    methods = {"triplets": triplet, "SI": by_strength, "sigma_1": by_density}
+    for names in methods.values():
+        for run in np.flatnonzero(~given.has_result):
+            names[run] = None
+    modal = {name: _modal(given, verdicts) for name, verdicts in methods.items()}
+    pairs = [("triplets", "SI"), ("triplets", "sigma_1"), ("SI", "sigma_1")]
+    return {
+        "delta": delta,
+        "classes": CLASSES,
+        "pairs": [_pair(methods, modal, *pair) for pair in pairs],
+        "modal": modal,
+        "cells": [given.place(i) for i in range(given.n_cells)],
+        "differing": [
+            given.place(i) | {name: verdicts[i] for name, verdicts in modal.items()}
+            for i in range(given.n_cells)
+            if len({verdicts[i] for verdicts in modal.values()}) > 1
+        ],
+    }
+
+
+def _pair(
+    methods: dict[str, list[str | None]], modal: dict[str, list[str | None]], row: str, column: str
+) -> dict[str, Any]:
+    runs = confusion(methods[row], methods[column])
+    cells = confusion(modal[row], modal[column])
+    return {
+        "rows": row,
+        "columns": column,
+        "counts": runs.counts,
+        "agreement": runs.agreement,
+        "kappa": runs.kappa,
+        "cells_equal": int(np.trace(cells.counts)),
+        "cells": int(cells.counts.sum()),
+    }
+
+
+def _modal(given: Given, verdicts: Sequence[str | None]) -> list[str | None]:
+    return [
+        most_frequent(Counter(verdicts[run] for run in _runs(given, i)))
+        for i in range(given.n_cells)
+    ]

@@ -1,0 +1,117 @@
+"""Analyses of runs that another sweep's classes judge."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from chimera_hpc.classify import tree
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
+from chimera_hpc.classify.robustness import fraction_curve
+from chimera_hpc.reduction.analyses.given import Given
+
+_ORDER = (*CLASSES, STEADY, NO_WINDOW)
+
+
+def atlas(given: Given) -> dict[str, Any]:
+    """Every run judged by each atlas; the first one's classes as a background.
+
+    For each cell: votes, modal class (over all runs with a result; ties go to the earlier of
+    ordered, chimera, disordered), the mean triplet of the runs of the modal class, and their mean
+    distance to the nearest training point.
+    """
+    judges = {name: _judged_cells(given, judge) for name, judge in given.atlases.items()}
+    first = next(iter(given.atlases.values()))
+    span = first.scaler[1] - first.scaler[0]
+    background = {
+        "triplets": first.points * np.where(span > 0.0, span, 1.0) + first.scaler[0],
+        "labels": first.labels,
+        "names": first.names,
+    }
+    return {"judges": judges, "background": background}
+
+
+def _judged_cells(given: Given, judge: Atlas) -> list[dict[str, Any]]:
+    names, distance = given.judged_names(judge), judge.classify(given.triplets).distance
+    found = []
+    for i in range(given.n_cells):
+        runs = np.flatnonzero((given.cell == i) & given.has_result)
+        votes = Counter(names[run] for run in runs)
+        modal = most_frequent(votes)
+        chosen = [run for run in runs if names[run] == modal]
+        oscillates = bool(chosen) and bool(np.isfinite(given.triplets[chosen]).all())
+        found.append(
+            {
+                **given.place(i),
+                "class": modal,
+                "votes": {name: votes[name] for name in _ORDER if votes[name]},
+                "triplet": given.triplets[chosen].mean(axis=0) if oscillates else None,
+                "distance": float(distance[chosen].mean()) if oscillates else None,
+            }
+        )
+    return found
+
+
+def most_frequent(votes: Counter[Any]) -> str | None:
+    """Return the class with most votes, the earlier in the fixed order at a tie."""
+    return max((n for n in _ORDER if votes[n]), key=lambda name: votes[name], default=None)
+
+
+def robustness(given: Given) -> dict[str, Any]:
+    """W: share of chimeras by each atlas against the number of reversed links (ratio-o1-o2)."""
+    flips = given.points.columns["flips"]
+    curves = {}
+    for name, judge in given.atlases.items():
+        verdicts = given.judged_names(judge)
+        curve = fraction_curve(flips, _is(verdicts, "chimera"), given.has_result)
+        others = {
+            other: fraction_curve(flips, _is(verdicts, other), given.has_result).fraction
+            for other in ("ordered", "disordered", STEADY)
+        }
+        curves[name] = {
+            **curve.to_dict(),
+            "others": others,
+            "holds_until": curve.holds_until(),
+            "half_at": _falls_below(curve.x, curve.fraction, 0.5),
+            "zero_from": _zero_from(curve.x, curve.fraction),
+        }
+    row = given.points.row(0)
+    return {
+        "judge": next(iter(given.atlases)),
+        "orientation": row["orientation"],
+        "Q": row["Q"],
+        "label": _label(given),
+        "by": curves,
+    }
+
+
+def _label(given: Given) -> str:
+    row = given.points.row(0)
+    label = f"orientation {row['orientation']}"
+    if row["flip_set"] == 1:
+        return f"{label}, links at node 1"
+    return label if row["orientation"] == 2 or row["Q"] else f"{label}, $Q$ = 0"
+
+
+def _is(verdicts: Sequence[str | None], name: str) -> list[bool]:
+    return [verdict == name for verdict in verdicts]
+
+
+def _falls_below(x: tree.Floats, fraction: tree.Floats, level: float) -> float | None:
+    """Smallest x after which a running mean over five values stays below the level."""
+    smooth = np.convolve(np.pad(fraction, 2, mode="edge"), np.full(5, 0.2), mode="valid")
+    high = np.flatnonzero(smooth >= level)
+    if not len(high):
+        return float(x[0])
+    return float(x[high[-1] + 1]) if high[-1] + 1 < len(x) else None
+
+
+def _zero_from(x: tree.Floats, fraction: tree.Floats) -> float | None:
+    """Smallest x from which on the fraction is 0 throughout, if any."""
+    positive = np.flatnonzero(fraction > 0.0)
+    first = int(positive[-1]) + 1 if len(positive) else 0
+    return float(x[first]) if first < len(x) else None

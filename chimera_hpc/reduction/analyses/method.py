@@ -1,0 +1,96 @@
+"""Analyses of the Fourier method itself, and of the triplets it gives."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.job.selection import parse_selection
+from chimera_hpc.measures.fourier import fourier_features
+from chimera_hpc.measures.synthetic import synthetic_profiles, synthetic_signal
+from chimera_hpc.measures.windows import maxima, windows
+from chimera_hpc.reduction.analyses.given import Given
+from chimera_hpc.reduction.results import TRIPLET
+from chimera_hpc.reduction.selection import find_point
+
+Array = NDArray[np.float64]
+_REFINES: tuple[Literal["parabola", "sine-fit"], ...] = ("parabola", "sine-fit")
+_LEVELS = (0.0, 2.5, 25.0, 50.0, 75.0, 97.5, 100.0)
+
+
+def variations(given: Given) -> dict[str, Any]:
+    """Quantiles of V_theta, V_a, V_Omega and sigma_1 over the oscillating runs of each cell."""
+    names = (*TRIPLET, "sigma_1")
+    rows = []
+    for i in range(given.n_cells):
+        runs = (given.cell == i) & (given.status == Status.DONE)
+        row: dict[str, Any] = {**given.place(i), "runs": int(runs.sum())}
+        for name in names if runs.any() else ():
+            row[name] = np.percentile(given.scalars[name][runs], _LEVELS)
+        rows.append(row)
+    return {"levels": _LEVELS, "cells": rows}
+
+
+def synthetic(given: Given) -> dict[str, Any]:
+    """Known profiles against those found on [500, 1000] (fig:FFT), by two ways to refine.
+
+    Absolute time: the phase is that of the signal at t = 0, as eq:syntsig has it.
+    """
+    t = 500.0 + 0.01 * np.arange(50_001)
+    u = synthetic_signal(t)
+    truth = synthetic_profiles()._asdict()
+    found, errors = {}, {}
+    for refine in _REFINES:
+        made = fourier_features(t, u, refine=refine, clock="own", time_origin="absolute")
+        found[refine] = {name: getattr(made, name) for name in truth}
+        errors[refine] = {
+            name: float(np.abs(_error(truth[name], found[refine][name], name == "phase")).max())
+            for name in truth
+        }
+    shown = t >= 990.0
+    return {
+        "truth": truth,
+        "found": found,
+        "largest_error": errors,
+        "signal": {"t": t[shown][::5], "u": np.round(u[shown][::5], 5)},
+    }
+
+
+def _error(true: Array, found: Array, periodic: bool) -> Array:
+    error = true - found
+    return (error + np.pi) % (2.0 * np.pi) - np.pi if periodic else error
+
+
+def spectrum(given: Given) -> dict[str, Any]:
+    """First window of node 1 of a chimera: samples and amplitude spectrum (paper fig:FFTsign).
+
+    The run is the second of ``reduction.show``. The window runs from a maximum to the ninth after
+    it, both ends included, without padding or taper.
+    """
+    assert given.series is not None
+    selections = given.sweep.reduction.show
+    run = find_point(given.points, parse_selection(selections[min(1, len(selections) - 1)]))
+    assert run is not None
+    t, u = given.series(run)
+    y = np.ascontiguousarray(u[:, 0])
+    first, last = windows(maxima(y), given.sweep.features.n_peaks, given.sweep.features.n_share)
+    window = slice(int(first[0]), int(last[0]) + 1)
+    samples = y[window] - y[window].mean()
+    amplitude = 2.0 / len(samples) * np.abs(np.fft.rfft(samples))
+    frequency = np.fft.rfftfreq(len(samples), given.sweep.integrator.t_step)
+    peak = int(amplitude.argmax())
+    curve = np.polyfit((-1.0, 0.0, 1.0), amplitude[peak - 1 : peak + 2], 2)
+    return {
+        **given.points.row(run),
+        "t": t[window],
+        "y": y[window],
+        "frequency": frequency,
+        "amplitude": amplitude,
+        "peak": peak,
+        "n_samples": len(samples),
+        "raw_frequency": float(frequency[peak]),
+        "refined_offset_in_bins": float(-0.5 * curve[1] / curve[0]),
+    }

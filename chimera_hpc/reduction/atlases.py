@@ -1,0 +1,64 @@
+"""Atlases of other sweeps: found on the disk, read from their stores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.reduction.results import read_results
+from chimera_hpc.store.labelled import STORE_NAME
+from chimera_hpc.store.store import Store
+
+
+def load_atlas(folder: str | Path) -> Atlas:
+    """Return the atlas that the reduction of a sweep's folder has stored.
+
+    Its ``classify`` judges new triplets (V_theta, V_a, V_Omega): see there for the rule, and for
+    the distance to the nearest training point as a measure of confidence.
+
+    Raises
+    ------
+    BadInput
+        No store in the folder, or it has not been reduced.
+    """
+    stored = Store.open(Path(folder) / STORE_NAME).reduction()
+    return Atlas.from_arrays(stored.arrays, stored.attributes)
+
+
+def atlases_of(folder: Path, names: Sequence[str], say: Callable[[str], None]) -> dict[str, Atlas]:
+    """Load the atlases that a job names, from folders beside the sweep's own or from paths."""
+    found: dict[str, Atlas] = {}
+    for name in names:
+        place = sibling(folder, name)
+        try:
+            atlas = load_atlas(place)
+        except BadInput as error:
+            say(f"atlas {name}: {error}")
+            continue
+        if not atlas.names:
+            say(f"atlas {name}: {place} has no classes")
+        else:
+            found[name] = atlas
+    return found
+
+
+def sibling(folder: Path, name: str) -> Path:
+    """Return the folder that a name stands for: beside the sweep's own, or a path as it is."""
+    path = Path(name)
+    return path if path.is_absolute() or len(path.parts) > 1 else folder.absolute().parent / name
+
+
+def curves_beside(
+    folder: Path, names: Sequence[str], say: Callable[[str], None]
+) -> dict[str, dict[str, Any]]:
+    """Return ``curves`` of other sweeps' results.json by the names of the sweeps."""
+    found = {}
+    for name in names:
+        try:
+            found[name] = read_results(sibling(folder, name) / "results.json")["curves"]
+        except BadInput as error:
+            say(f"beside {name}: {error}")
+    return found

@@ -1,0 +1,300 @@
+"""The reduction of a sweep: store in; classes, results.json, a table and figures out."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.files import remove_leftovers, temporary_name, write_atomically
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.atlas import Atlas, Variable
+from chimera_hpc.classify.classification import Classification, classify
+from chimera_hpc.classify.modes import run_names
+from chimera_hpc.reduction.cells import FreeAxis, free_axes
+from chimera_hpc.reduction.record import reduction_variables
+from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
+from chimera_hpc.reduction.selection import check_selections
+from chimera_hpc.reduction.table import class_table
+from chimera_hpc.store.labelled import STORE_NAME
+from chimera_hpc.store.schema import sample_times
+from chimera_hpc.store.store import Store
+
+if TYPE_CHECKING:
+    from chimera_hpc.plot.catalogue import Maker
+    from chimera_hpc.plot.outcome import Outcome
+
+RESULTS, FIGURES = "results.json", "figures"
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a reduction made."""
+
+    points: dict[str, int]
+    """Number of points by outcome, as in results.json."""
+    table: str
+    """Modal classes as text."""
+    store: Path
+    results: Path
+    figures: tuple[Path, ...]
+    """PNG and PDF files."""
+    notes: tuple[str, ...]
+    """What could not be made, and why; a line each."""
+
+
+def reduce_sweep(
+    folder: str | Path,
+    *,
+    make_figures: bool = True,
+    say: Say = lambda line: None,
+    curves: Mapping[str, Any] | None = None,
+    claims: Sequence[Mapping[str, Any]] = (),
+) -> Summary:
+    """Classify the points that are done, and write all that follows from them.
+
+    Writes the store's group ``reduction``, results.json and the folder figures. A store that is
+    not finished is reduced as far as it is done, and one without a run that oscillates too. Killed
+    at any moment, each file is whole, old or new, and another reduction puts all of them right.
+
+    Parameters
+    ----------
+    folder : path
+        A sweep's folder, the one that holds store.zarr.
+    make_figures : bool
+    say : callable
+        Called with each line for the user: counts, what could not be made, the table, the paths.
+    curves, claims
+        What else results.json is to hold under these keys.
+
+    Raises
+    ------
+    BadInput
+        No store in the folder, or a point to replay that the model cannot be given.
+    DamagedChunk
+        A chunk of results that the ledger vouches for is missing or damaged.
+    """
+    folder = Path(folder)
+    store = Store.open(folder / STORE_NAME)
+    work = _Work(folder, store, say)
+    work.classify(curves, claims)
+    figures = work.draw() if make_figures else ()
+    work.tell(figures)
+    return Summary(
+        points=work.results["points"],
+        table=work.table,
+        store=store.path,
+        results=folder / RESULTS,
+        figures=figures,
+        notes=tuple(work.notes),
+    )
+
+
+class _Work:
+    """One reduction under way."""
+
+    def __init__(self, folder: Path, store: Store, say: Say) -> None:
+        check_selections(store.sweep, store.points)
+        self.folder, self.store, self._say = folder, store, say
+        self.notes: list[str] = []
+        self.ledger = store.ledger()
+        self.status = self.ledger["status"]
+        self.scalars = store.scalars()
+        self.triplets = np.stack([self.scalars[name] for name in TRIPLET], axis=1)
+        axes = [name for name in store.points.axes if name != "seed"]
+        self.axes: list[FreeAxis] = free_axes(store.points.cells()[1], axes)
+        self.classification: Classification
+        self.results: dict[str, Any] = {}
+        self.curves: dict[str, Any] = {}
+        self.atlases: dict[str, Atlas] = {}
+        self.table = ""
+
+    def note(self, line: str) -> None:
+        self.notes.append(line)
+        self._say(line)
+
+    def classify(
+        self, curves: Mapping[str, Any] | None, claims: Sequence[Mapping[str, Any]]
+    ) -> None:
+        store, spec = self.store, self.store.sweep.reduction
+        made = classify(
+            self.triplets,
+            self.status,
+            linkage=spec.linkage,
+            cuts=spec.cuts,
+            depth=spec.depth,
+            names=spec.names,
+        )
+        self.classification = made
+        self.curves = {**self._analyses(), **(curves or {})}
+        self.results = build_results(
+            store.sweep, store.points, self.ledger, made, self.curves, claims
+        )
+        self.curves = self.results["curves"]
+        store.write_reduction(*self._variables())
+        write_atomically(self.folder / RESULTS, to_json(self.results).encode())
+        self._say(_coverage(self.results["points"]))
+        self._explain_missing_classes()
+        self.table = class_table(
+            {str(k): self.results["cuts"][str(k)]["cells"] for k in self.cuts}, self.axes
+        )
+
+    def _analyses(self) -> dict[str, Any]:
+        """Make what ``reduction.analyses`` asks for."""
+        store, spec = self.store, self.store.sweep.reduction
+        if not spec.analyses and not spec.atlas:
+            return {}
+        from chimera_hpc.reduction.analyses import Given, analyse
+        from chimera_hpc.reduction.atlases import atlases_of
+
+        def series(i: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            # Few analyses ask for it; what reads a run loads the kernels.
+            from chimera_hpc.reduction.runs import series_of
+
+            return sample_times(store.sweep), series_of(store, i)
+
+        self.atlases = atlases_of(self.folder, spec.atlas, self.note)
+        given = Given(
+            sweep=store.sweep,
+            points=store.points,
+            status=self.status,
+            scalars=self.scalars,
+            classification=self.classification,
+            cut=self.classification.cuts[self.cuts[0]],
+            atlases=self.atlases,
+            series=series,
+        )
+        return analyse(given, self.note)
+
+    def _variables(self) -> tuple[dict[str, Variable], dict[str, Any]]:
+        """What the store keeps: the classes, and the atlases that judged with their verdicts."""
+        variables, attributes = reduction_variables(
+            self.store.points, self.status, self.classification
+        )
+        for number, (name, atlas) in enumerate(self.atlases.items()):
+            arrays, names = atlas.variables()
+            judged = atlas.classify(self.triplets)
+            variables |= {
+                f"judge_{number}_{key}": (tuple(f"judge_{number}_{d}" for d in dimensions), values)
+                for key, (dimensions, values) in arrays.items()
+            }
+            variables[f"judge_{number}_labels"] = (("point",), judged.label)
+            variables[f"judge_{number}_distance"] = (("point",), judged.distance)
+            attributes[f"judge_{number}"] = {"sweep": name, **names}
+        return variables, attributes
+
+    @property
+    def cuts(self) -> list[int]:
+        """Numbers of clusters: as the job lists them, then that of its depth."""
+        asked = [*self.store.sweep.reduction.cuts, *self.classification.cuts]
+        return list(dict.fromkeys(asked))
+
+    def _explain_missing_classes(self) -> None:
+        members = len(self.classification.members)
+        if members == 0:
+            self.note("no run oscillates yet: there is nothing to classify")
+            return
+        for asked, cut in self.classification.cuts.items():
+            if len(cut.names) < asked:
+                self.note(f"{asked} clusters: only {len(cut.names)}, of {members} oscillating runs")
+
+    def draw(self) -> tuple[Path, ...]:
+        """Make the figures that the job asks for."""
+        from chimera_hpc.plot.catalogue import choose
+
+        asked = self.store.sweep.reduction.figures
+        makers = choose(asked, self.cuts)
+        outcome = self._outcome(makers)
+        drawn: dict[str, Maker] = {}
+        for name, make in makers.items():
+            if make is None:
+                self.note(f"figure {name}: this sweep has no such cut")
+            else:
+                drawn[name] = make
+        made = _write_figures(self.folder, drawn, outcome)
+        for name in drawn if asked != "auto" else ():
+            if not any(path.stem == name for path in made):
+                self.note(f"figure {name}: this sweep has nothing for it to show")
+        return made
+
+    def _outcome(self, names: Mapping[str, object]) -> Outcome:
+        from chimera_hpc.plot.outcome import Outcome
+        from chimera_hpc.reduction.atlases import curves_beside
+        from chimera_hpc.reduction.runs import shown_runs, whole_runs
+
+        store, made = self.store, self.classification
+        first = made.cuts[self.cuts[0]]
+        runs = run_names(first.labels, self.status, first.names)
+        for atlas in list(self.atlases.values())[:1]:  # the judge's names, where there is one
+            verdicts = zip(atlas.classify(self.triplets).name, runs, self.status, strict=True)
+            runs = [name if code == Status.DONE else run for name, run, code in verdicts]
+        needs_runs = {"space_time", "indicators", "incoherence"} & set(names)
+        return Outcome(
+            classification=made,
+            triplets=self.triplets,
+            axes=[(axis.symbol, axis.values) for axis in self.axes],
+            cells={k: self.results["cuts"][str(k)]["cells"] for k in self.cuts},
+            curves=self.curves,
+            beside=curves_beside(self.folder, store.sweep.reduction.beside, self.note),
+            shown=shown_runs(store, self.status, self.triplets, first, runs, self.axes, self.note)
+            if needs_runs
+            else (),
+            whole=whole_runs(store.sweep, store.points.row(0), self.axes, self.note)
+            if "whole_run" in names
+            else (),
+        )
+
+    def tell(self, figures: Sequence[Path]) -> None:
+        """Say what was found and where it is."""
+        for line in self.table.splitlines():
+            self._say(line)
+        self._say(f"store    {self.store.path}")
+        self._say(f"results  {self.folder / RESULTS}")
+        if figures:
+            stems = dict.fromkeys(path.stem for path in figures)
+            self._say(f"figures  {self.folder / FIGURES}: {', '.join(stems)} (PNG and PDF)")
+
+
+def _coverage(points: Mapping[str, int]) -> str:
+    total, pending = points["total"], points["pending"]
+    words = {"done": "oscillate", "steady": "steady", "no_window": "without a complete window"}
+    parts = [f"{points[key]} {word}" for key, word in words.items() if points[key]]
+    if points["failed"]:
+        parts.append(f"{points['failed']} failed")
+    ran = total - pending
+    return f"{ran} of {total} points run" + (f": {', '.join(parts)}" if parts else "")
+
+
+def _write_figures(folder: Path, makers: Mapping[str, Maker], outcome: Outcome) -> tuple[Path, ...]:
+    """Draw into a folder of its own, then put each file in its place; remove those of before."""
+    from chimera_hpc.plot.catalogue import is_figure_name
+    from chimera_hpc.plot.style import save
+
+    place = folder / FIGURES
+    remove_leftovers(folder)
+    work = temporary_name(place)
+    work.mkdir()
+    try:
+        drawn: list[Path] = []
+        for name, make in makers.items():
+            figure = make(outcome)
+            if figure is not None:
+                drawn.extend(save(figure, work / name))
+        place.mkdir(exist_ok=True)
+        fresh = {path.name for path in drawn}
+        for old in (*place.glob("*.png"), *place.glob("*.pdf")):
+            if is_figure_name(old.stem) and old.name not in fresh:
+                old.unlink()
+        for path in drawn:
+            os.replace(path, place / path.name)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return tuple(place / path.name for path in drawn)

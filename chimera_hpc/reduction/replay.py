@@ -1,0 +1,201 @@
+"""Points of a sweep computed anew, with the same kernels, to be looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.modes import run_names
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.tables import Features
+from chimera_hpc.measures import window_lines
+from chimera_hpc.plot.spectrum import Spectrum
+from chimera_hpc.reduction.cells import describe, free_axes
+from chimera_hpc.reduction.results import TRIPLET
+from chimera_hpc.store.ledger import digests
+from chimera_hpc.store.schema import sample_times
+from chimera_hpc.store.store import Store
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One point computed anew.
+
+    Attributes
+    ----------
+    point : int
+        Its number in the store.
+    title : str
+        Parameters that vary, seed and class.
+    t, u, w : shape (T,), (T, N), (T, N)
+        The two signals on the analysis interval, u as it is stored, NaN where the run did not get.
+    status : Status
+    features : shape (8, N)
+        NaN unless the status is DONE.
+    triplet : shape (3,)
+        V_theta, V_a, V_Omega.
+    n_windows : int
+    digest, stored : int, int or None
+        Digest of what came out now, and of what the store holds, None where the point never ran.
+    class_name : str or None
+        Class by the last reduction; None without one.
+    """
+
+    point: int
+    title: str
+    t: Array
+    u: Array
+    w: Array
+    status: Status
+    features: Array
+    triplet: Array
+    n_windows: int
+    digest: int
+    stored: int | None
+    class_name: str | None
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the same came out as is stored, bit for bit."""
+        return self.digest == self.stored
+
+    @property
+    def period(self) -> float:
+        """Median over the nodes, NaN without features."""
+        frequency = float(np.median(self.features[1]))
+        return 1.0 / frequency if frequency > 0.0 else float("nan")
+
+
+def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
+    """Compute points of a store anew, all at once; their bits do not depend on one another."""
+    from chimera_hpc.run.block import run_block, store_as
+
+    which = np.asarray(chosen, dtype=np.int64)
+    signals: dict[int, tuple[Array, Array]] = {}
+
+    def keep(row: int, u: Array, w: Array) -> None:
+        stored = np.empty(u.shape[::-1], dtype=store.sweep.keep.dtype)
+        signals[row] = store_as(u, stored, np.empty(u.shape)).T.copy(), w.T.copy()
+
+    made = run_block(store.sweep, store.points[which], on_signals=keep)
+    ledger, names, times = store.ledger(), classes_of(store), sample_times(store.sweep)
+    found = digests(made.features, made.scalars)
+    return [
+        Replay(
+            point=i,
+            title=_title(store, i, names[i]),
+            t=times,
+            u=signals[row][0],
+            w=signals[row][1],
+            status=Status(int(made.status[row])),
+            features=made.features[row],
+            triplet=made.scalars[row, : len(TRIPLET)],
+            n_windows=int(made.n_windows[row]),
+            digest=int(found[row]),
+            stored=None if ledger["status"][i] == Status.NEVER else int(ledger["digest"][i]),
+            class_name=names[i],
+        )
+        for row, i in enumerate(which.tolist())
+    ]
+
+
+def classes_of(store: Store) -> list[str | None]:
+    """Return the class of every point in the first cut of the last reduction, None without one.
+
+    Runs that do not oscillate are ``steady`` or ``no_window``.
+    """
+    try:
+        stored = store.reduction()
+    except BadInput:
+        return [None] * store.n_points
+    asked = store.sweep.reduction.cuts or stored.attributes["cuts"]
+    labels = stored.arrays.get(f"labels_{asked[0]}")
+    if labels is None or len(labels) != store.n_points:
+        return [None] * store.n_points
+    names = stored.attributes[f"names_{asked[0]}"][:-2]
+    return run_names(labels, store.ledger()["status"], names)
+
+
+def representative(store: Store, chosen: Sequence[int]) -> int:
+    """Return the one of these points that stands for them all.
+
+    Of those in their most frequent class it is the one nearest to their median triplet, each
+    variation in units of its spread; the first point where none has a triplet.
+    """
+    names, scalars = classes_of(store), store.scalars()
+    triplets = np.stack([scalars[name][list(chosen)] for name in TRIPLET], axis=1)
+    usable: NDArray[np.bool_] = np.asarray(np.isfinite(triplets).all(axis=1))
+    if not usable.any():
+        return int(chosen[0])
+    called = [names[i] for i in chosen]
+    votes = [name for name, ok in zip(called, usable, strict=True) if ok]
+    modal = max(dict.fromkeys(votes), key=votes.count)
+    mine = usable & np.array([name == modal for name in called])
+    offset = np.abs(triplets[mine] - np.median(triplets[mine], axis=0))
+    spread = np.ptp(triplets[mine], axis=0)
+    distance = (offset / np.where(spread > 0.0, spread, 1.0)).sum(axis=1)
+    return int(np.asarray(chosen)[mine][np.argmin(distance)])
+
+
+def window_spectrum(
+    t: Array, u: Array, settings: Features, node: int, window: int
+) -> tuple[Spectrum, str]:
+    """Return what the Fourier method saw of one node in one window, and a line that says it.
+
+    Parameters
+    ----------
+    t, u : shape (T,), (T, N)
+    settings : Features
+        How the sweep measures.
+    node, window : int
+        Both from 0.
+
+    Raises
+    ------
+    BadInput
+        There is no such node or window.
+    """
+    if not 0 <= node < u.shape[1]:
+        raise BadInput(f"--node {node}: allowed is 0 to {u.shape[1] - 1}")
+    names = ("n_peaks", "n_share", "clock", "clock_node", "refine", "time_origin", "still")
+    lines = window_lines(t, u, **{name: getattr(settings, name) for name in names})
+    clock = node if settings.clock == "own" else 0
+    count = int(lines.counts[clock])
+    if not 0 <= window < count:
+        raise BadInput(f"--window {window}: allowed is 0 to {count - 1}")
+    part = slice(int(lines.first[clock, window]), int(lines.last[clock, window]) + 1)
+    y, place = u[part, node], (node, window)
+    samples = y - y.mean()
+    amplitude = 2.0 / len(y) * np.abs(np.fft.rfft(samples))
+    frequency = np.fft.rfftfreq(len(y), (t[-1] - t[0]) / (len(t) - 1))
+    found = {k: float(getattr(lines, k)[place]) for k in ("amplitude", "frequency", "phase")}
+    origin = 0.0 if settings.time_origin == "absolute" else t[part][0]
+    angle = 2.0 * np.pi * found["frequency"] * (t[part] - origin) + found["phase"]
+    fit = lines.baseline[place] + found["amplitude"] * np.cos(angle)
+    peak = 1 + int(amplitude[1:].argmax())
+    text = (
+        f"node {node}, window {window} of {count}: {len(y)} samples, "
+        f"frequency {found['frequency']:.6g} (largest line {frequency[peak]:.6g}), "
+        f"amplitude {found['amplitude']:.6g}, phase {found['phase']:.6g} rad"
+    )
+    return Spectrum(t[part], y, frequency, amplitude, peak, fit), text
+
+
+def _title(store: Store, i: int, name: str | None) -> str:
+    axes = [axis for axis in store.points.axes if axis != "seed"]
+    row = store.points.row(i)
+    free = free_axes(store.points.cells()[1], axes)
+    place = ", ".join(filter(None, [describe(row, free, math=True), f"seed {row['seed']}"]))
+    return "\n".join(filter(None, [place, name and name.replace("_", " ")]))
+
+
+def has_nullcline(sweep: Sweep) -> bool:
+    """Whether the model's first variable stands still on w = u - u^3 / 3 where it is alone."""
+    return sweep.model == "topological_fhn"

@@ -1,0 +1,184 @@
+"""results.json: everything a reader needs of a finished sweep, in one plain file."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import Classification, Cut
+from chimera_hpc.classify.modes import CellTable, modal_classes
+
+SCHEMA = 1
+TRIPLET = ("V_theta", "V_a", "V_Omega")
+
+
+class NamedSweep(Protocol):
+    """What is asked of a sweep."""
+
+    @property
+    def name(self) -> str:
+        """Name of the sweep."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the tables of the job file, defaults filled in."""
+        ...
+
+
+def build_results(
+    sweep: NamedSweep,
+    points: CellTable,
+    ledger: Mapping[str, NDArray[np.int64]],
+    classification: Classification,
+    curves: Mapping[str, Any] | None = None,
+    claims: Sequence[Mapping[str, Any]] = (),
+) -> dict[str, Any]:
+    """Assemble the contents of results.json; plain Python values only, None in place of NaN.
+
+    Cells carry every coordinate of `points` but the seed, and what the sweep holds fixed besides
+    (the number of nodes). Beyond the agreed keys, each cut tells the depth of its line, and
+    ``clustering`` tells linkage, scaling, whether a sample was clustered, and the order of splits.
+    """
+    status = np.asarray(ledger["status"])
+    fixed = sweep.to_dict().get("fixed", {})
+    results = {
+        "schema": SCHEMA,
+        "sweep": sweep.name,
+        "points": count_points(status),
+        "cuts": {
+            str(asked): _describe_cut(points, status, cut, fixed)
+            for asked, cut in classification.cuts.items()
+        },
+        "clustering": _describe_clustering(classification),
+        "curves": dict(curves or {}),
+        "claims": [dict(claim) for claim in claims],
+    }
+    plain: dict[str, Any] = json_safe(results)
+    return plain
+
+
+def count_points(status: ArrayLike) -> dict[str, int]:
+    """Count points by outcome; the parts sum to the total."""
+    codes = np.asarray(status)
+    count = {code: int(np.count_nonzero(codes == code)) for code in Status}
+    return {
+        "total": len(codes),
+        "done": count[Status.DONE],
+        "steady": count[Status.STEADY],
+        "no_window": count[Status.NO_WINDOW],
+        "failed": sum(n for code, n in count.items() if code.is_failure),
+        "pending": count[Status.NEVER],
+    }
+
+
+def _describe_cut(
+    points: CellTable, status: NDArray[np.int64], cut: Cut, fixed: Mapping[str, Any]
+) -> dict[str, Any]:
+    clusters = [
+        {"name": name, "size": size, "centroid": dict(zip(TRIPLET, centroid, strict=True))}
+        for name, size, centroid in zip(cut.names, cut.sizes, cut.centroids, strict=True)
+    ]
+    cells = [{**fixed, **cell} for cell in modal_classes(points, status, cut)]
+    return {"clusters": clusters, "cells": cells, "depth": cut.depth}
+
+
+def _describe_clustering(classification: Classification) -> dict[str, Any]:
+    return {
+        "linkage": classification.method,
+        "minimum": dict(zip(TRIPLET, classification.scaler[0], strict=True)),
+        "maximum": dict(zip(TRIPLET, classification.scaler[1], strict=True)),
+        "sampled": classification.sampled,
+        "clustered_points": len(classification.members),
+        "order_of_splits": [
+            {"depth": s.depth, "clusters": s.n_clusters, "class": s.name, "sizes": s.sizes}
+            for s in classification.order_of_splits()
+        ],
+    }
+
+
+def json_safe(value: Any) -> Any:
+    """Turn NumPy values into plain ones, tuples into lists, and NaN or infinity into None."""
+    if isinstance(value, Mapping):
+        return {str(key): json_safe(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return json_safe(value.tolist())
+    if isinstance(value, list | tuple):
+        return [json_safe(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def read_results(path: str | Path) -> dict[str, Any]:
+    """Return the contents of a results.json.
+
+    Raises
+    ------
+    BadInput
+        When it is missing, or something else than this module writes.
+    """
+    try:
+        results = json.loads(Path(path).read_bytes())
+        _Results.model_validate(results)
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror or error}") from None
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"])) or "all of it"
+        raise BadInput(f"{path}: no results of a sweep: {place[:100]!r}: {first['msg']}") from None
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: no results of a sweep: {error}") from None
+    return dict(results)
+
+
+class _Part(BaseModel):
+    """A part of results.json as far as readers rely on it."""
+
+    model_config = ConfigDict(strict=True, extra="allow", defer_build=True)
+
+
+class _Cluster(_Part):
+    name: str
+    size: int = Field(ge=0)
+
+
+class _Cell(_Part):
+    modal_class: str | None = Field(alias="class")
+    votes: dict[str, Annotated[int, Field(ge=0)]]
+
+
+class _Cut(_Part):
+    clusters: list[_Cluster]
+    cells: list[_Cell]
+
+
+class _Points(_Part):
+    total: int
+    done: int
+    steady: int
+    no_window: int
+    failed: int
+    pending: int
+
+
+class _Results(_Part):
+    version: Literal[1] = Field(alias="schema")
+    sweep: str
+    points: _Points
+    cuts: dict[str, _Cut]
+    curves: dict[str, Any]
+    claims: list[dict[str, Any]]
+
+
+def to_json(results: Mapping[str, Any]) -> str:
+    """Return the text of results.json; equal results give equal text."""
+    return json.dumps(json_safe(results), indent=1, allow_nan=False) + "\n"

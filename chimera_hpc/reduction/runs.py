@@ -1,0 +1,113 @@
+"""The runs that a reduction draws: read from the store, or integrated anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import Cut
+from chimera_hpc.classify.modes import count_votes
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.selection import parse_selection
+from chimera_hpc.job.tables import Keep
+from chimera_hpc.plot.outcome import Run
+from chimera_hpc.reduction.cells import FreeAxis, describe
+from chimera_hpc.reduction.selection import find_point, single_point
+from chimera_hpc.store.schema import sample_times, series_mask
+from chimera_hpc.store.store import Store
+
+Array = NDArray[np.float64]
+
+
+def shown_runs(
+    store: Store,
+    status: NDArray[np.int64],
+    triplets: Array,
+    cut: Cut,
+    names: Sequence[str | None],
+    axes: Sequence[FreeAxis],
+    say: Callable[[str], None],
+) -> list[Run]:
+    """Return the runs of ``reduction.show``, without it a run of each class of the cut."""
+    selections = store.sweep.reduction.show
+    if not selections:
+        chosen = representatives(store.sweep, store.points, cut)
+    else:
+        chosen = []
+        for text in selections:
+            i = find_point(store.points, parse_selection(text))
+            if i is None:
+                say(f"not shown: {text} is not in this sweep")
+            elif not Status(int(status[i])).is_result:
+                say(f"not shown: {text}: {Status(int(status[i])).sentence}")
+            else:
+                chosen.append(i)
+    return [_load(store, i, names[i] or "", triplets[i], axes) for i in chosen]
+
+
+def representatives(sweep: Sweep, points: Points, cut: Cut) -> list[int]:
+    """Return for each class a run of the cell with most votes for it, a kept one where possible."""
+    cell = points.cells()[0]
+    votes = count_votes(cell, cut.labels, int(cell.max(initial=-1)) + 1)
+    kept = series_mask(sweep, points.columns["seed"])
+    chosen = []
+    for label in range(len(cut.names)):
+        runs = np.flatnonzero((cut.labels == label) & (cell == votes[:, label].argmax()))
+        chosen.append(int(runs[np.argmax(kept[runs])]))
+    return chosen
+
+
+def whole_runs(
+    sweep: Sweep,
+    first: dict[str, int | float],
+    axes: Sequence[FreeAxis],
+    say: Callable[[str], None],
+) -> list[Run]:
+    """Return the runs of ``reduction.replay``, integrated from 0 to t_end."""
+    runs = []
+    for text in sweep.reduction.replay:
+        single = single_point(sweep, first, text)
+        points = single.points()
+        u, status = _integrate(single, points)
+        if status.is_failure:
+            say(f"not drawn: {text}: {status.sentence}")
+            continue
+        runs.append(Run(_place(points.row(0), axes), sample_times(single), u))
+    return runs
+
+
+def _load(store: Store, i: int, class_name: str, triplet: Array, axes: Sequence[FreeAxis]) -> Run:
+    """Return a run of the store; its series is computed again where it is not kept."""
+    place, features = _place(store.points.row(i), axes), None
+    oscillates = bool(np.isfinite(triplet).all())
+    if oscillates:
+        block, row = divmod(i, store.block_size)
+        features = np.array(store.files.read("features", block)[row])
+    t, u = sample_times(store.sweep), series_of(store, i)
+    return Run(place, t, u, class_name, features, triplet if oscillates else None)
+
+
+def series_of(store: Store, i: int) -> Array:
+    """Return the series (T, N) of a point; it is computed again where it is not kept."""
+    if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
+        return store.series(i)
+    return _integrate(store.sweep, store.points[i : i + 1])[0]
+
+
+def _place(row: Mapping[str, int | float], axes: Sequence[FreeAxis]) -> str:
+    return ", ".join(filter(None, [describe(row, axes, math=True), f"seed {row['seed']}"]))
+
+
+def _integrate(sweep: Sweep, points: Points) -> tuple[Array, Status]:
+    """Compute one point as a task does; return its series (T, N) and its status."""
+    from chimera_hpc.run.block import run_block
+
+    keep = Keep(series="all", dtype="float32")
+    result = run_block(sweep.model_copy(update={"keep": keep}), points)
+    series: NDArray[Any] | None = result.series
+    assert series is not None
+    return series[0].astype(np.float64), Status(int(result.status[0]))

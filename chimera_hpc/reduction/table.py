@@ -1,0 +1,122 @@
+"""The modal classes as text: a line a cell, a map of letters, or a count."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from chimera_hpc.classify.modes import NO_WINDOW, STEADY
+from chimera_hpc.classify.naming import CLASSES
+from chimera_hpc.reduction.cells import FreeAxis, number
+
+Cells = Sequence[Mapping[str, Any]]
+
+MOST_LINES = 60
+WIDTH = 100
+"""Limits of a table for the terminal; beyond them it says less."""
+_NOTHING = "."
+
+
+def class_table(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
+    """Return the modal classes as text.
+
+    Parameters
+    ----------
+    cuts : mapping of str to cells
+        For each cut its cells with ``class`` and ``votes``, in one order (as in results.json). The
+        first cut is the one that maps and counts show.
+    axes : sequence of FreeAxis
+        What varies between cells.
+    """
+    if not cuts:
+        return ""
+    cut, cells = next(iter(cuts.items()))
+    if len(axes) < 2 and len(cells) <= MOST_LINES:
+        return _lines(cuts, axes)
+    if len(axes) == 1:
+        return _ranges(cells, axes[0])
+    if len(axes) == 2 and (text := _map(cells, axes[0], axes[1])):
+        return f"modal classes of {cut} clusters\n{text}"
+    return _counts(cells)
+
+
+def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
+    columns = [[axis.plain, *map(number, axis.values)] for axis in axes]
+    for i, (cut, cells) in enumerate(cuts.items()):
+        columns.append([f"{cut} clusters", *(cell["class"] or _NOTHING for cell in cells)])
+        if i == 0:
+            columns.append(["votes", *(_votes(cell) for cell in cells)])
+    widths = [max(map(len, column)) for column in columns]
+    rows = [
+        "  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
+        for row in zip(*columns, strict=True)
+    ]
+    return "\n".join(rows)
+
+
+def _votes(cell: Mapping[str, Any]) -> str:
+    votes = sorted(cell["votes"].items(), key=lambda vote: -vote[1])
+    return ", ".join(f"{name} {count}" for name, count in votes) or "none yet"
+
+
+def _ranges(cells: Cells, axis: FreeAxis) -> str:
+    """List for each class the stretches of the axis that it covers."""
+    order = np.argsort(axis.values, kind="stable")
+    stretches: dict[str, list[list[str]]] = {}
+    last = None
+    for i in order:
+        name = cells[i]["class"] or _NOTHING
+        if name != last:
+            stretches.setdefault(name, []).append([])
+        stretches[name][-1].append(number(axis.values[i]))
+        last = name
+    width = max(map(len, stretches))
+    return "\n".join(
+        f"{name.ljust(width)}  {axis.plain}: "
+        + ", ".join(part[0] if len(part) == 1 else f"{part[0]}-{part[-1]}" for part in parts)
+        for name, parts in stretches.items()
+    )
+
+
+def _map(cells: Cells, across: FreeAxis, up: FreeAxis) -> str:
+    """Return a letter for each cell, the second axis upwards; empty when that is too large."""
+    x, column = np.unique(across.values, return_inverse=True)
+    y, row = np.unique(up.values, return_inverse=True)
+    letters = _letters(_in_order({cell["class"] for cell in cells if cell["class"]}))
+    heads, sides = [number(value) for value in x], [number(value) for value in y]
+    width = 1 + max(map(len, heads))
+    margin = max(map(len, [*sides, up.plain]))
+    if len(y) > MOST_LINES or margin + width * len(x) > WIDTH:
+        return ""
+    grid = [[" "] * len(x) for _ in y]
+    for cell, i, j in zip(cells, row, column, strict=True):
+        grid[i][j] = letters.get(cell["class"], _NOTHING)
+    lines = [up.plain]
+    for side, marks in zip(sides[::-1], grid[::-1], strict=True):
+        lines.append(side.rjust(margin) + "".join(mark.rjust(width) for mark in marks).rstrip())
+    lines.append(" " * margin + "".join(head.rjust(width) for head in heads) + f"  {across.plain}")
+    lines.append(", ".join(f"{letter} {name}" for name, letter in letters.items()))
+    return "\n".join(lines)
+
+
+def _in_order(names: set[str]) -> list[str]:
+    """Sort as in figures: ordered, chimera, disordered, others, then what does not oscillate."""
+    rank = {name: i for i, name in enumerate(CLASSES)} | {STEADY: 4, NO_WINDOW: 5}
+    return sorted(names, key=lambda name: (rank.get(name, 3), name))
+
+
+def _letters(names: Sequence[str]) -> dict[str, str]:
+    """Give each name a letter of its own, if possible its first."""
+    taken: dict[str, str] = {}
+    for name in names:
+        wishes = [*name, *"ABCDEFGHIJKLMNOPQRSTUVWXYZ"]
+        taken[name] = next((c for c in wishes if c.isalnum() and c not in taken.values()), "?")
+    return taken
+
+
+def _counts(cells: Cells) -> str:
+    counts = Counter(cell["class"] or "no result yet" for cell in cells)
+    return "\n".join(f"{count:8d} cells {name}" for name, count in counts.most_common())

@@ -1,0 +1,1 @@
+"""Computing a sweep: blocks of work, executors, clusters, signals, progress."""

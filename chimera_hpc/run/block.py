@@ -1,0 +1,263 @@
+"""The science of one block: points in, arrays out. A pure function, without Dask and Zarr.
+
+The arrays of a point depend on the point and on the code, not on its neighbours in the block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.beside import stepping_loops_beside
+from chimera_hpc.integrate.lanes import Control, Outcome, Stopped, integrate
+from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.models import build
+from chimera_hpc.job.registry import method
+from chimera_hpc.measures import (
+    FourierFeatures,
+    fourier_features,
+    local_sigma,
+    order_parameter,
+    range_of,
+    sigma,
+)
+from chimera_hpc.measures.series import by_node, quantise, round_to
+from chimera_hpc.measures.variation import total_variations
+from chimera_hpc.models.protocol import Model
+from chimera_hpc.run.initial_state import initial_state
+from chimera_hpc.store.block_result import BlockResult, empty_result
+from chimera_hpc.store.schema import MISSING, SCALE, sample_times, series_mask
+
+Array = NDArray[np.float64]
+
+OnSignals = Callable[[int, Array, Array], None]
+_RETRIED = (Status.NON_FINITE, Status.STEP_TOO_SMALL)
+
+
+def run_block(
+    sweep: Sweep,
+    points: Points,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+    on_point: Callable[[int, Status], None] | None = None,
+    on_signals: OnSignals | None = None,
+    lanes: int | None = None,
+) -> BlockResult:
+    """Integrate the points and measure their series.
+
+    A run that becomes non-finite, or whose steps become too small, is tried again with both
+    tolerances multiplied by ``run.tighten``, up to ``run.attempts`` tries in all.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    points : Points
+        Any points of the sweep.
+    should_stop : callable, optional
+        Asked about ten times a second; when true, the result is returned as far as it has come.
+    on_point : callable, optional
+        Called with (index, status) as each point ends.
+    on_signals : callable, optional
+        Called with (index, u, w) as each point ends; both signals are (N, T), NaN where the run did
+        not get to, as they were before u was rounded. They are buffers: copy what is to be kept.
+    lanes : int, optional
+        Lanes of the stepping loop; chosen from the work by default.
+    """
+    block = _Block(sweep, points, on_signals)
+    with suppress(Stopped):
+        for rows in _lane_groups(block.models):
+            factor = 1.0
+            for left in reversed(range(sweep.run.attempts)):
+                rows = block.integrate(rows, factor, left > 0, should_stop, on_point, lanes)
+                factor *= sweep.run.tighten
+    return block.result
+
+
+def _lane_groups(models: list[Model]) -> Iterator[list[int]]:
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for row, model in enumerate(models):
+        groups.setdefault(model.lane_group, []).append(row)
+    yield from groups.values()
+
+
+def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
+    """Write a signal (N, T) as a store keeps it, and return what the store gives back, in `back`.
+
+    What is measured is what is stored: a maximum between two nearly equal samples would otherwise
+    move to the other one, and its window with it, when the features are computed anew from the
+    store. Values beyond the range of int16, which the store does not keep, are rounded alike.
+
+    Parameters
+    ----------
+    u, back : shape (N, T)
+    stored : shape (T, N)
+        In the type of the store.
+    """
+    if stored.dtype != np.int16:
+        stored[:] = u.T
+        back[:] = stored.T
+    elif quantise(u, SCALE, MISSING, stored, back):
+        round_to(by_node(u, back), SCALE, back)
+    return back
+
+
+class _Block:
+    """Models, initial states and the result that the runs fill."""
+
+    def __init__(self, sweep: Sweep, points: Points, on_signals: OnSignals | None) -> None:
+        n, times = len(points), sample_times(sweep)
+        self.sweep, self.times, self.on_signals = sweep, times, on_signals
+        rows = [points.row(i) for i in range(n)]
+        self.models = [build(sweep, row) for row in rows]
+        self.initial = [
+            initial_state(sweep, row, model) for row, model in zip(rows, self.models, strict=True)
+        ]
+        self.keeps = series_mask(sweep, points.columns["seed"])
+        self.result = empty_result(sweep, n)
+        # Of the run being measured: u as stored, u and w node by node.
+        shape = (sweep.n_nodes, len(times))
+        self.stored = np.empty(shape[::-1], dtype=sweep.keep.dtype)
+        self.u, self.w = np.empty(shape), np.empty(shape)
+
+    def integrate(
+        self,
+        rows: list[int],
+        factor: float,
+        may_retry: bool,
+        should_stop: Callable[[], bool] | None,
+        on_point: Callable[[int, Status], None] | None,
+        lanes: int | None,
+    ) -> list[int]:
+        """Run the points ``rows``; return those to be tried again, which count as not reached."""
+        if not rows:
+            return []
+        spec = self.sweep.integrator
+        control = Control(
+            t_end=spec.t_end,
+            start=float(self.times[0]),
+            step=spec.t_step,
+            rtol=spec.rtol * factor,
+            atol=spec.atol * factor,
+            method=method(spec.method),
+            max_steps=spec.max_steps,
+            time_out=spec.time_out,
+        )
+        models = [self.models[row] for row in rows]
+        again: list[int] = []
+
+        def on_end(number: int, outcome: Outcome) -> None:
+            row = rows[number]
+            self.result.steps[row] += outcome.steps
+            self.result.elapsed_us[row] += int(1e6 * outcome.elapsed)
+            if may_retry and outcome.status in _RETRIED:
+                again.append(row)
+                return
+            self.measure(row, outcome)
+            if on_point is not None:
+                on_point(row, Status(self.result.status[row]))
+
+        def state(number: int) -> Array:
+            return models[number].state(*self.initial[rows[number]])
+
+        n_rows = max(model.n_rows for model in models)
+        integrate(models, state, control, n_rows, on_end, should_stop, lanes)
+        return again
+
+    def measure(self, row: int, outcome: Outcome) -> None:
+        result, model = self.result, self.models[row]
+        result.status[row] = outcome.status
+        if self.on_signals is not None:
+            outcome.samples[:, outcome.n_sampled :] = np.nan
+            self.on_signals(row, *model.node_pair(outcome.samples))
+        if outcome.status is not Status.DONE:
+            return
+        u, w = model.node_pair(outcome.samples)
+        stored = self.stored
+        if result.series is not None and self.keeps[row]:
+            stored = result.series[row]
+        u = store_as(u, stored, self.u)
+        w = by_node(w, self.w)
+        features = self.features(u)
+        result.status[row] = features.status
+        result.n_windows[row] = features.n_windows
+        result.features[row] = features.as_array()
+        result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
+
+    def features(self, u: Array) -> FourierFeatures:
+        spec = self.sweep.features
+        return fourier_features(
+            self.times,
+            u.T,
+            n_peaks=spec.n_peaks,
+            n_share=spec.n_share,
+            clock=spec.clock,
+            clock_node=spec.clock_node,
+            phase_mean=spec.phase_mean,
+            refine=spec.refine,
+            time_origin=spec.time_origin,
+            still=spec.still,
+        )
+
+    def scalars(
+        self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
+    ) -> Array:
+        return np.array(
+            [
+                *total_variations(features),
+                *(sigma(u), sigma(w)),
+                *(features.deviation, range_of(u)),
+                *(order_parameter(u, w), self.distance(row, y_end)),
+                *local_sigma(u, self.sweep.features.groups),
+            ]
+        )
+
+    def distance(self, row: int, y_end: Array) -> float:
+        """Distance of the last state (u, v) from the centre of the ball of initial states.
+
+        In the norm of the ball (paper fig:stability).
+        """
+        model, spec = self.models[row], self.sweep.integrator
+        u, v = model.equilibrium(spec.centre)
+        t_end = np.array([spec.t_end])
+        second = model.second_variable(y_end[:, None], self.initial[row][1], t_end)[0]
+        offset = np.concatenate([y_end[: model.n_nodes] - u, second - v])
+        if spec.ball == "maximum":
+            return float(np.abs(offset).max())
+        return float(np.sqrt(np.sum(offset * offset)))
+
+
+def warm_up(sweep: Sweep, points: Points) -> None:
+    """Compile every kernel that the sweep's points need, or read it from the disk.
+
+    Called once before workers start, so that they find everything compiled.
+    """
+    model = build(sweep, points.row(0))
+    with stepping_loops_beside():
+        _warm_up_the_rest(sweep, model)
+    state = model.state(*initial_state(sweep, points.row(0), model))
+    control = Control(t_end=0.02, start=0.0, step=0.01, method=method(sweep.integrator.method))
+    for lanes in (1, LANES):
+        integrate([model], [state], control, model.n_rows, lambda *_: None, lanes=lanes)
+
+
+def _warm_up_the_rest(sweep: Sweep, model: Model) -> None:
+    # Compiled, or read from the disk, when it is first asked for.
+    _ = model.right_hand_side
+    t = 0.01 * np.arange(2000.0)
+    rows = np.sin(2.0 * np.pi * t + np.arange(3.0)[:, None])
+    spec = sweep.features
+    fourier_features(t, rows.T, clock=spec.clock, refine=spec.refine)
+    order_parameter(rows.T, rows.T)
+    local_sigma(rows.T, 1)
+    # In the integrator's order: time by time.
+    samples = np.repeat(rows, 2, axis=0).T.copy().T
+    back = np.empty(rows.shape)
+    stored = np.empty(back.shape[::-1], dtype=np.int16)
+    round_to(by_node(samples[:3], back), SCALE, back)
+    store_as(samples[:3], stored, back)

@@ -1,0 +1,344 @@
+"""Driving a store to its end: the runs of ``run`` and ``retry``, whatever happens on the way."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import HOPELESS
+from chimera_hpc.base.processes import process_mark
+from chimera_hpc.base.status import Status
+from chimera_hpc.run.progress import Reporter
+from chimera_hpc.run.signals import StopRequest
+from chimera_hpc.run.slurm.walltime import NEAR, time_to_leave
+from chimera_hpc.store.claims import live_claims
+from chimera_hpc.store.ledger import RESULTS, unfinished
+from chimera_hpc.store.provenance import differences, gather
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from chimera_hpc.job.tables import Slurm
+    from chimera_hpc.run.messages import Again, BlockReceipt, Orders, Trouble
+    from chimera_hpc.store.store import Store
+
+CLUSTERS = ("serial", "local", "scheduler-file", "slurm", "allocation")
+_COMPILE_THEMSELVES = ("slurm", "allocation")
+"""Where each node compiles the kernels; the driver's own machine may be of another type."""
+_CLUSTER_TRIES = 3
+"""Times that a cluster may be lost before a block is done."""
+_BLOCK_TRIES = 3
+"""Errors of the operating system after which a block is put aside."""
+_LONGEST_WAIT = 10.0
+_RUNS_COMPARED = 20
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the work is done."""
+
+    kind: str
+    workers: int = 0
+    scheduler_file: Path | None = None
+    memory: str | None = None
+    """Limit a worker, as `800MB`."""
+    wishes: Slurm | None = None
+    """What is asked of SLURM."""
+    share: tuple[int, int] | None = None
+    """Which share of the blocks, of how many: block i belongs to share i modulo their number."""
+
+
+class Refreshing(Protocol):
+    """Something that follows a run, such as its report."""
+
+    def refresh(self, note: Callable[[str], None]) -> None: ...
+
+
+class Driver:
+    """Works a store through, and knows afterwards what is in the way of its end."""
+
+    def __init__(
+        self,
+        store: Store,
+        place: Place,
+        stop: StopRequest,
+        log: Path,
+        again: Again,
+        strict: bool = False,
+    ) -> None:
+        self.store, self.place, self.stop = store, place, stop
+        self.again, self.strict, self.log = again, strict, log
+        self.ended_by: str | None = None
+        """What made going on hopeless, on one line."""
+        self.broken: dict[int, Trouble] = {}
+        """Blocks that were put aside, and why."""
+        self._errors: Counter[int] = Counter()
+        self._machines: list[str] = []
+        self._late = False
+        self._may_come: Callable[[], bool] = lambda: False
+        self.report: Refreshing | None = None
+        """Written again from time to time while the work goes on, if given."""
+        self.meanwhile: Callable[[], object] | None = None
+        """What to do in a thread while workers start, if given."""
+
+    def work(self) -> None:
+        """Do what is left of the store until nothing is left, or to stop."""
+        try:
+            reporter = Reporter(self.store.n_points, self.log)
+        except OSError as error:
+            raise _cannot_write(self.log, error) from None
+        with reporter as self.reporter, self.stop.good_order():
+            self._work()
+
+    def should_stop(self) -> bool:
+        """Return whether somebody asked to stop, or going on has become hopeless."""
+        if self.ended_by is None and time_to_leave():
+            self.ended_by = NEAR
+        return self.stop() or self.ended_by is not None
+
+    def pending(self) -> list[int]:
+        """Return the blocks with something to do that were not put aside."""
+        again = self.again
+        blocks = self.store.pending(
+            True, attempts=again.attempts, statuses=again.statuses, before=again.before
+        )
+        index, count = self.place.share or (0, 1)
+        return [b for b in blocks if b not in self.broken and b % count == index]
+
+    def _count(self) -> None:
+        """Have the reporter count what the ledger says, whoever did it."""
+        again, ledger = self.again, self.store.ledger()
+        to_do = unfinished(ledger, again.attempts, again.statuses, again.before)
+        failed = ~to_do & (ledger["status"] > max(RESULTS))
+        self.reporter.count(int((~to_do).sum()), int(failed.sum()))
+
+    def _work(self) -> None:
+        store, say = self.store, self.reporter.say
+        try:
+            for line in store.repair():
+                say(line)
+            blocks = self.pending()
+            self._count()
+            if not blocks:
+                say("nothing to compute")
+                return
+            orders = self._start(len(blocks))
+        except OSError as error:
+            raise _cannot_write(store.path, error) from None
+        try:
+            if self.place.kind == "serial":
+                self._serial(orders)
+            else:
+                self._on_cluster(orders)
+        except OSError as error:
+            self.ended_by = f"{error.strerror or error}" + f" ({error.filename})"
+        finally:
+            _remove(orders.stop_file)
+            self._record(orders)
+
+    def _start(self, n_blocks: int) -> Orders:
+        """Record the run, and compile what it needs."""
+        from chimera_hpc.run.compiled import compile_once
+        from chimera_hpc.run.messages import Orders
+
+        store, say = self.store, self.reporter.say
+        info = gather(store.sweep.model)
+        for line in changes(store, info, self.strict):
+            say(line)
+        run = store.start_run({**info, "cluster": self.place.kind})
+        kind = self.place.kind
+        say(f"run {run}: {n_blocks} of {store.n_blocks} blocks to do, {kind}, in {store.path}")
+        if kind not in _COMPILE_THEMSELVES:
+            began = time.perf_counter()
+            compile_once(store.sweep, store.points, load=kind == "serial")
+            self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
+        self.again = self.again.of_run(run)
+        return Orders(store.path, run, self.again, process_mark())
+
+    def _serial(self, orders: Orders) -> None:
+        from chimera_hpc.run.executors import run_serial
+
+        for blocks in self._rounds():
+            run_serial(
+                *(orders, self._in_time(blocks), lambda r: self._note(orders, r)), self.should_stop
+            )
+
+    def _on_cluster(self, orders: Orders) -> None:
+        from chimera_hpc.run.executors import ClusterLost, run_dask
+
+        patience, losses, done = self.store.sweep.run.patience, 0, self.reporter.done
+        while losses < _CLUSTER_TRIES:
+            try:
+                with self._cluster(patience) as client:
+                    for blocks in self._rounds():
+                        run_dask(
+                            *(client, orders, self._in_time(blocks)),
+                            *(lambda r: self._note(orders, r), self.should_stop),
+                            *(patience, lambda: self._may_come()),
+                        )
+                return
+            except ClusterLost as error:
+                losses = 1 if self.reporter.done > done else losses + 1
+                reason = str(error)
+            except BadInput as error:
+                if not losses:
+                    raise
+                losses, reason = losses + 1, str(error)
+            done = self.reporter.done
+            self.reporter.say(f"the cluster is lost ({reason}), {losses} of {_CLUSTER_TRIES} times")
+            if self.stop():
+                return
+        self.ended_by = "the cluster was lost again and again"
+
+    @contextmanager
+    def _cluster(self, patience: float) -> Iterator[Client]:
+        place, say = self.place, self.reporter.say
+        from chimera_hpc.run.local_cluster import existing_cluster, local_cluster
+
+        if place.kind == "slurm" and place.wishes is not None:
+            from chimera_hpc.run.slurm.workers import slurm_cluster
+
+            blocks = len(self.pending())
+            with slurm_cluster(place.wishes, self.store.path, blocks, say, patience) as both:
+                client, keeper = both
+                self._may_come = keeper.coming
+                yield client
+        elif place.kind == "allocation" and place.wishes is not None:
+            from chimera_hpc.run.slurm.allocation import allocation_cluster
+
+            with allocation_cluster(place.wishes, self.store.path, say, patience) as client:
+                yield client
+        elif place.scheduler_file is not None:
+            with existing_cluster(place.scheduler_file, patience=patience) as client:
+                yield client
+        else:
+            with local_cluster(
+                place.workers,
+                patience=patience,
+                memory_limit=place.memory or "auto",
+                meanwhile=self.meanwhile,
+            ) as client:
+                yield client
+
+    def _in_time(self, blocks: list[int]) -> Iterator[int]:
+        """Yield blocks as long as none has turned out to be too long for the job's time."""
+        for block in blocks:
+            if self._late:
+                return
+            yield block
+
+    def _rounds(self) -> Iterator[list[int]]:
+        """Yield the blocks that are free, again and again, until nothing is left or to stop.
+
+        Blocks in other hands are waited for: their owner may die.
+        """
+        wait = 0.25
+        while not self.should_stop():
+            blocks = self.pending()
+            if not blocks:
+                return
+            self._count()
+            others = live_claims(self.store.path)
+            free = [block for block in blocks if block not in others]
+            before = self.reporter.done
+            if free:
+                yield free
+            if self._late:
+                self.ended_by = self.ended_by or NEAR
+                return
+            if self.reporter.done > before:
+                wait = 0.25
+            elif blocks:
+                self._sleep(wait)
+                wait = min(2 * wait, _LONGEST_WAIT)
+
+    def _sleep(self, seconds: float) -> None:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until and not self.should_stop():
+            time.sleep(0.05)
+
+    def _note(self, orders: Orders, receipt: BlockReceipt) -> None:
+        """Take a receipt to the books."""
+        if receipt.machine and receipt.machine not in self._machines:
+            self._machines.append(receipt.machine)
+            self._record(orders)
+        if receipt.trouble is not None:
+            self._note_trouble(receipt.block, receipt.trouble)
+        # A worker that is a job of its own is followed by another one.
+        self._late |= receipt.late and self.place.kind != "slurm"
+        if not receipt.taken:
+            self.reporter.note(
+                f"block {receipt.block}: {receipt.n_done} done, {receipt.n_failed} failed, "
+                f"{receipt.seconds:.2f} s"
+            )
+            self.reporter.add(receipt.n_done, receipt.n_failed, receipt.seconds)
+        if self.report is not None:
+            self.report.refresh(self.reporter.note)
+
+    def _record(self, orders: Orders) -> None:
+        """Write beside the run's record where its points were computed, and until when."""
+        from chimera_hpc.store.runs import record_work
+
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        try:
+            record_work(orders.store, orders.run, {"machines": self._machines, "until": now})
+        except OSError:
+            # A disk that is full will be heard of from the blocks.
+            return
+
+    def _note_trouble(self, block: int, trouble: Trouble) -> None:
+        self.reporter.note(f"block {block}: {trouble.trace}")
+        self._errors[block] += 1
+        if trouble.errno in HOPELESS:
+            self.ended_by = self.ended_by or trouble.text
+        elif trouble.errno is None or self._errors[block] >= _BLOCK_TRIES:
+            self.broken[block] = trouble
+            self.reporter.say(f"block {block} is put aside: {trouble.text}")
+
+
+def changes(store: Store, info: dict[str, Any], strict: bool) -> list[str]:
+    """Return a line for each thing that may change numbers since the results in a store were made.
+
+    Raises
+    ------
+    BadInput
+        When there is any, and `strict` forbids it.
+    """
+    from chimera_hpc.store.runs import read_run
+
+    lines: dict[str, None] = {}
+    for run in runs_of_results(store)[-_RUNS_COMPARED:]:
+        try:
+            before = read_run(store.path, run)
+        except BadInput as error:
+            lines[str(error)] = None
+            continue
+        lines |= dict.fromkeys(f"run {run} had other {line}" for line in differences(before, info))
+    if lines and strict:
+        raise BadInput(f"{store.path}: --strict: " + "; ".join(lines))
+    return [f"warning: {line}; its points stay, marked by their run" for line in lines]
+
+
+def runs_of_results(store: Store) -> list[int]:
+    """Return the numbers of the runs that left results in a store, rising."""
+    ledger = store.ledger()
+    return sorted({int(run) for run in set(ledger["run"][ledger["status"] != Status.NEVER])})
+
+
+def _cannot_write(path: Path, error: OSError) -> BadInput:
+    where = error.filename or path
+    return BadInput(f"{where}: can't be written: {error.strerror or error}")
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return

@@ -1,0 +1,43 @@
+"""The random initial state of a point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.streams import initial_stream, stream_key
+from chimera_hpc.job import Sweep
+from chimera_hpc.models.custom import OwnPoint
+from chimera_hpc.models.protocol import Model, Row
+
+Array = NDArray[np.float64]
+
+
+def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:
+    """Draw the initial state (u, v) of a point.
+
+    Uniform in the ball of radius ``delta`` around ``integrator.centre``: in the maximum norm every
+    variable is ``centre + delta * U[-1, 1]``, u first, then v (paper sec. Method and results). In
+    the Euclidean norm the direction is Gaussian and the radius ``delta * U**(1/n)``. A user's model
+    may draw it otherwise, from the same stream.
+
+    Returns
+    -------
+    u : shape (N0,)
+    v : shape (n_second,)
+    """
+    stream = initial_stream(*stream_key(sweep.model, sweep.n_nodes, row))
+    drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
+    if drawn is not None:
+        return drawn
+    size = model.n_nodes + model.n_second
+    if sweep.integrator.ball == "maximum":
+        offset = stream.uniform(-1.0, 1.0, size)
+    else:
+        direction = stream.standard_normal(size)
+        radius = stream.uniform() ** (1.0 / size)
+        offset = direction * (radius / np.sqrt(np.sum(direction * direction)))
+    u, v = model.equilibrium(sweep.integrator.centre)
+    centre = np.repeat([u, v], [model.n_nodes, model.n_second])
+    state = centre + row["delta"] * offset
+    return state[: model.n_nodes], state[model.n_nodes :]

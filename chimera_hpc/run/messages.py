@@ -1,0 +1,98 @@
+"""What a run tells whoever works for it, and what it is told of each block.
+
+Kept apart from `work`, so that a driver whose workers integrate need not load what integrates.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Sweep
+from chimera_hpc.store.ledger import NO_LIMIT
+
+
+@dataclass(frozen=True)
+class Again:
+    """Which failed points are run once more, beside the points that never ran."""
+
+    attempts: int = 0
+    """Those that were tried fewer times than this."""
+    statuses: tuple[Status, ...] = (Status.TIME_OUT, Status.OUT_OF_MEMORY)
+    """Those that failed in one of these ways. Numerical failures had their further tries, under
+    tighter tolerances, inside the task; a point that killed its workers is left alone."""
+    earlier_only: bool = False
+    """Those that failed in an earlier run than the one that asks."""
+    before: int = NO_LIMIT
+    """Those that failed in a run below this number."""
+    time_out: float | None = None
+    """Seconds of wall time a point in place of `integrator.time_out`."""
+    max_steps: int | None = None
+    """Steps a point in place of `integrator.max_steps`."""
+
+    def of_run(self, run: int) -> Again:
+        """Return the same for a run that has got its number."""
+        return replace(self, before=run) if self.earlier_only else self
+
+    def applied(self, sweep: Sweep) -> Sweep:
+        """Return the sweep with these limits: they decide how far a point gets, not its numbers."""
+        limits = {"time_out": self.time_out, "max_steps": self.max_steps}
+        given = {name: limit for name, limit in limits.items() if limit is not None}
+        if not given:
+            return sweep
+        return sweep.model_copy(update={"integrator": sweep.integrator.model_copy(update=given)})
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What a run tells whoever works for it."""
+
+    store: Path
+    run: int
+    again: Again = Again()
+    driver: str = ""
+    """Mark of the process that gives the orders, see `processes.process_mark`."""
+
+    @property
+    def stop_file(self) -> Path:
+        """File whose presence tells the workers of the run, wherever they are, to stop."""
+        return self.store / "runs" / f"{self.run}.stop"
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """Why a block could not be done, though none of its points is to blame as far as we know."""
+
+    text: str
+    """One line for people."""
+    trace: str
+    """The traceback, for the log."""
+    errno: int | None = None
+    """Of an error of the operating system, such as a full disk."""
+
+
+@dataclass(frozen=True)
+class BlockReceipt:
+    """What became of one block in this run: small, so that a scheduler can carry thousands."""
+
+    block: int
+    n_done: int = 0
+    n_failed: int = 0
+    seconds: float = 0.0
+    taken: bool = False
+    """Somebody else was at it."""
+    stopped: bool = False
+    """The run was told to stop before the block was whole."""
+    late: bool = False
+    """It was not begun, or not ended: too little is left of the batch job's time."""
+    trouble: Trouble | None = None
+    machine: str = ""
+    """Where it was computed."""
+
+
+def tell_to_stop(orders: Orders) -> None:
+    """Tell all workers of a run to stop in good order; on a full disk they find out themselves."""
+    with suppress(OSError):
+        orders.stop_file.touch()

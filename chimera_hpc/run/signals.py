@@ -1,0 +1,64 @@
+"""Stopping in good order: what the signals of people and of batch systems ask for."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from chimera_hpc.base.exits import Exit
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGHUP)
+
+
+class StopRequest:
+    """Whether a signal asked to stop, and which exit status it leads to."""
+
+    def __init__(self) -> None:
+        self.asked: list[int] = []
+        self.in_order = False
+
+    def __call__(self) -> bool:
+        """Return whether to stop."""
+        return bool(self.asked)
+
+    @property
+    def exit_status(self) -> Exit:
+        """Status to leave with when the work was not finished."""
+        return Exit.INTERRUPTED if signal.SIGINT in self.asked else Exit.MORE_TO_DO
+
+    @contextmanager
+    def good_order(self) -> Iterator[None]:
+        """Let the work inside end by asking this object; elsewhere a signal breaks off at once."""
+        self.in_order = True
+        try:
+            yield
+        finally:
+            self.in_order = False
+
+    def take(self, number: int, frame: FrameType | None = None) -> None:
+        """Note a signal; raise KeyboardInterrupt outside of good order, and at a second Ctrl-C."""
+        again = number == signal.SIGINT and bool(self.asked)
+        self.asked.append(number)
+        if again or not self.in_order:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def stop_request() -> Iterator[StopRequest]:
+    """Turn SIGINT, SIGTERM, SIGUSR1 and SIGHUP into a request.
+
+    Only in the main thread. A signal that the caller has ignored (nohup, a job in the background)
+    stays so; the handlers before are put back at the end.
+    """
+    request = StopRequest()
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    taken = [number for number, handler in before.items() if handler != signal.SIG_IGN]
+    for number in taken:
+        signal.signal(number, request.take)
+    try:
+        yield request
+    finally:
+        for number in taken:
+            signal.signal(number, before[number])

@@ -1,0 +1,298 @@
+"""One block: claimed, computed, written. The one unit of work that all executors share.
+
+Whatever goes wrong with a block is said in its receipt; nothing is raised through a scheduler.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.files import HOPELESS
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Points
+from chimera_hpc.run.block import run_block
+from chimera_hpc.run.messages import BlockReceipt, Orders, Trouble, tell_to_stop
+from chimera_hpc.run.slurm import walltime
+from chimera_hpc.store.block_result import BlockResult, failed_block
+from chimera_hpc.store.claims import Claim, ClaimLost, LostAttempt, claim_block, forget_points
+from chimera_hpc.store.ledger import METADATA
+from chimera_hpc.store.provenance import cpu_model
+from chimera_hpc.store.store import Store
+
+LOSSES_BEFORE_SPLIT = 2
+"""Deaths of its workers after which a block is done point by point, to find the culprit."""
+_STOP_LOOK_SECONDS = 0.3
+
+Rows = NDArray[np.int64]
+
+
+@dataclass
+class StopSignal:
+    """Whether to stop: asked by the integrator about ten times a second, and kept cheap."""
+
+    file: Path
+    local: Callable[[], bool] | None = None
+    _looked: float = field(default=0.0)
+    _found: bool = field(default=False)
+
+    def __call__(self) -> bool:
+        """Return whether the run is to stop."""
+        if walltime.time_to_leave() or (self.local is not None and self.local()):
+            return True
+        now = time.monotonic()
+        if now - self._looked > _STOP_LOOK_SECONDS:
+            self._looked = now
+            self._found = self.file.exists()
+        return self._found
+
+
+def do_block(
+    orders: Orders, block: int, local_stop: Callable[[], bool] | None = None
+) -> BlockReceipt:
+    """Claim a block, compute what is to do in it, write it.
+
+    Parameters
+    ----------
+    orders : Orders
+    block : int
+    local_stop : callable, optional
+        A second reason to stop, beside the run's stop file.
+    """
+    stop = StopSignal(orders.stop_file, local_stop)
+    if stop():
+        # It waited in a worker's queue: nothing is begun that would only be broken off.
+        return BlockReceipt(block, stopped=True)
+    try:
+        return _Block(orders, block, stop).do()
+    except ClaimLost:
+        return BlockReceipt(block, taken=True)
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        trouble = _trouble(f"{error.strerror or error}{where}", error.errno)
+        if error.errno in HOPELESS:
+            # Before a worker computes the next block in its queue for nothing.
+            tell_to_stop(orders)
+    except Exception as error:
+        trouble = _trouble(_in_a_line(error))
+    return BlockReceipt(block, trouble=trouble, machine=_machine())
+
+
+def hand_back_all() -> None:
+    """Give up the claims in hand at once: this process is being ended, not by its work."""
+    for claim in _in_hand:
+        with suppress(OSError):
+            claim.hand_back()
+
+
+def blame_memory() -> None:
+    """Leave word at the blocks in hand that this process is being ended for its use of memory."""
+    for claim in _in_hand:
+        claim.blame_memory()
+
+
+def is_busy() -> bool:
+    """Return whether this process holds any claim."""
+    return bool(_in_hand)
+
+
+_in_hand: list[Claim] = []
+"""The claims that this process holds now."""
+
+
+class _Block:
+    """A block in work: what is left of it, and what has come of it so far."""
+
+    def __init__(self, orders: Orders, block: int, stop: StopSignal) -> None:
+        self.orders, self.block, self.stop = orders, block, stop
+        self.store = open_cached(orders.store)
+        self.sweep = orders.again.applied(self.store.sweep)
+        self.n_done = self.n_failed = 0
+        self.trouble: Trouble | None = None
+
+    def do(self) -> BlockReceipt:
+        began = time.perf_counter()
+        hours = walltime.this_job()
+        if hours is not None and not hours.fits(self.store, self._rows_to_do()):
+            walltime.leave_if_worker()
+            return BlockReceipt(self.block, stopped=True, late=True)
+        with self._claimed(self.block) as claim:
+            whole = self._work(claim)
+            if whole and claim.lost:
+                forget_points(self.store.path, self.block)
+            _end(claim, whole)
+        return BlockReceipt(
+            self.block,
+            self.n_done,
+            self.n_failed,
+            time.perf_counter() - began,
+            stopped=not whole,
+            late=not whole and walltime.time_to_leave(),
+            trouble=self.trouble,
+            machine=_machine(),
+        )
+
+    def _rows_to_do(self) -> Rows:
+        """Return which points of the store are to be done, as far as one sees without a claim."""
+        again = self.orders.again
+        rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
+        return self.store.block(self.block)[0] + rows
+
+    @contextmanager
+    def _claimed(self, name: int | str) -> Iterator[Claim]:
+        """Hold a claim; it is handed back when the work on it is broken off."""
+        note = {"driver": self.orders.driver}
+        patience = self.sweep.run.patience
+        claim = claim_block(self.store.path, name, self.orders.run, expiry=patience, note=note)
+        if claim is None:
+            raise ClaimLost(f"{name} is in other hands")
+        _in_hand.append(claim)
+        try:
+            yield claim
+        except BaseException:
+            with suppress(OSError):
+                claim.hand_back()
+            raise
+        finally:
+            _in_hand.remove(claim)
+
+    def _work(self, claim: Claim) -> bool:
+        """Do what is to do; return whether all of it was reached."""
+        again = self.orders.again
+        rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
+        together, alone = _tries_together(self._deaths(claim))
+        groups = _pieces(rows, 1 if alone else max(1, len(rows)))
+        while groups:
+            group = groups.pop(0)
+            if alone:
+                result, tries = self._compute_alone(claim, group, together)
+            else:
+                result, tries = self._compute(group, claim), together + 1
+            if result is None:
+                groups = _pieces(group, -(-len(group) // 2)) + groups
+                continue
+            self._write(claim, result, tries, group)
+            if self.stop() and (result.status == Status.NEVER).any():
+                return False
+        return True
+
+    def _write(self, claim: Claim, result: BlockResult, tries: int, rows: Rows) -> None:
+        receipt = self.store.write_block(self.block, result, self.orders.run, tries, claim, rows)
+        self.n_done += receipt.n_done
+        self.n_failed += receipt.n_failed
+
+    def _compute(self, rows: Rows, *claims: Claim) -> BlockResult | None:
+        """Compute points; None when they are to be tried again, fewer at a time."""
+
+        def should_stop() -> bool:
+            return not all([claim.refresh() for claim in claims]) or self.stop()
+
+        points = self._points(rows)
+        try:
+            return run_block(self.sweep, points, should_stop=should_stop)
+        except MemoryError:
+            if len(rows) > 1:
+                return None
+            return failed_block(self.sweep, points, Status.OUT_OF_MEMORY)
+        except OSError:
+            raise
+        except Exception as error:
+            # An error in the code of a model: the other points of the block shall not suffer.
+            if len(rows) > 1:
+                return None
+            where = " ".join(f"{name}={points.row(0)[name]}" for name in points.axes)
+            self.trouble = self.trouble or _trouble(f"point {where}: {_in_a_line(error)}")
+            return failed_block(self.sweep, points, Status.NEVER)
+
+    def _compute_alone(
+        self, claim: Claim, rows: Rows, before: int
+    ) -> tuple[BlockResult | None, int]:
+        """Compute one point under a claim of its own, so that a lost worker is known to be its."""
+        with self._claimed(f"{self.block}_{rows[0]}") as own:
+            deaths = self._deaths(own)
+            tries = before + len(deaths)
+            if len(deaths) < self.sweep.run.attempts:
+                result = self._compute(rows, claim, own)
+                tries += 1
+            else:
+                memory = deaths[-1].out_of_memory
+                status = Status.OUT_OF_MEMORY if memory else Status.WORKER_LOST
+                result = failed_block(self.sweep, self._points(rows), status)
+            _end(own, result is None or bool((result.status != Status.NEVER).all()))
+        return result, tries
+
+    def _points(self, rows: Rows) -> Points:
+        return self.store.points[self.store.block(self.block)[0] + rows]
+
+    def _deaths(self, claim: Claim) -> list[LostAttempt]:
+        """Return the earlier attempts that may have died of the work itself.
+
+        A worker that went down after its driver, or with it, says nothing about the points.
+        """
+        return [
+            lost
+            for lost in claim.lost
+            if lost.out_of_memory or (not lost.handed_back and self._died_by_itself(lost))
+        ]
+
+    def _died_by_itself(self, lost: LostAttempt) -> bool:
+        process, note = lost.info.get("process"), lost.info.get("note")
+        was_driver = isinstance(note, dict) and note.get("driver") == process
+        return was_driver or lost.info.get("run") == self.orders.run
+
+
+def _tries_together(deaths: Sequence[LostAttempt]) -> tuple[int, bool]:
+    """Return how many attempts were made on the whole block, and whether no more of them are."""
+    for count, death in enumerate(deaths, start=1):
+        if count == LOSSES_BEFORE_SPLIT or death.out_of_memory:
+            return count, True
+    return len(deaths), False
+
+
+def _end(claim: Claim, whole: bool) -> None:
+    if whole:
+        claim.release()
+    else:
+        claim.hand_back()
+
+
+def open_cached(path: Path) -> Store:
+    """Open a store, once a process as long as its metadata don't change."""
+    try:
+        stamp = (path / METADATA).stat().st_mtime_ns
+    except FileNotFoundError:
+        stamp = 0
+    return _opened(path, stamp)
+
+
+@lru_cache(maxsize=4)
+def _opened(path: Path, stamp: int) -> Store:
+    return Store.open(path)
+
+
+def _pieces(rows: Rows, size: int) -> list[Rows]:
+    return [rows[i : i + size] for i in range(0, len(rows), size)]
+
+
+def _trouble(text: str, errno: int | None = None) -> Trouble:
+    return Trouble(text, traceback.format_exc(), errno)
+
+
+def _in_a_line(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+@cache
+def _machine() -> str:
+    job = os.environ.get("SLURM_JOB_ID")
+    return f"{socket.gethostname()}: {cpu_model()}" + (f", SLURM job {job}" if job else "")

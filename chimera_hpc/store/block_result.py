@@ -1,0 +1,70 @@
+"""What a block of points leaves behind, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.measures import FEATURES
+from chimera_hpc.store.schema import MISSING, scalar_labels
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BlockResult:
+    """What a block of n points leaves behind; rows in the order of the points.
+
+    A point that was not reached (the caller stopped) has status NEVER and is not written.
+
+    Attributes
+    ----------
+    status : shape (n,)
+        `Status` of each point.
+    features : shape (n, 8, N0)
+        Along axis 1 `features.FEATURES`; NaN unless the point is DONE.
+    scalars : shape (n, n_scalars)
+        Along axis 1 `layout.scalar_labels`; like the features, of u as it is stored (`rounded`).
+    steps, elapsed_us, n_windows : shape (n,)
+        Accepted steps, share of the wall time in microseconds, Fourier windows.
+    series : shape (n, T, N0) or None
+        u on the analysis interval as it is stored; None when the sweep keeps none.
+    """
+
+    status: NDArray[np.int64]
+    features: Array
+    scalars: Array
+    steps: NDArray[np.int64]
+    elapsed_us: NDArray[np.int64]
+    n_windows: NDArray[np.int64]
+    series: NDArray[Any] | None
+
+
+def failed_block(sweep: Sweep, points: Points, status: Status) -> BlockResult:
+    """Return the result of points that could not be computed at all, for the reason ``status``."""
+    result = empty_result(sweep, len(points))
+    result.status[:] = status
+    return result
+
+
+def empty_result(sweep: Sweep, n: int) -> BlockResult:
+    """Return the result of n points none of which was reached."""
+    series = None
+    if sweep.keep.series != "none":
+        missing = MISSING if sweep.keep.dtype == "int16" else np.nan
+        shape = (n, sweep.n_samples, sweep.n_nodes)
+        series = np.full(shape, missing, dtype=sweep.keep.dtype)
+    return BlockResult(
+        status=np.full(n, int(Status.NEVER), dtype=np.int64),
+        features=np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
+        scalars=np.full((n, len(scalar_labels(sweep.features.groups))), np.nan),
+        steps=np.zeros(n, dtype=np.int64),
+        elapsed_us=np.zeros(n, dtype=np.int64),
+        n_windows=np.zeros(n, dtype=np.int64),
+        series=series,
+    )

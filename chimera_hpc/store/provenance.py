@@ -1,0 +1,165 @@
+"""Where results come from: code, versions, machine, user, job; gathered once a run."""
+
+from __future__ import annotations
+
+import contextlib
+import getpass
+import os
+import platform
+import re
+import socket
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from functools import cache
+from hashlib import blake2b
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from chimera_hpc import __version__
+
+PACKAGE = Path(__file__).parents[1]
+_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "zarr", "dask", "distributed", "scikit-learn")
+_SLURM = (
+    "SLURM_JOB_ID",
+    "SLURM_ARRAY_JOB_ID",
+    "SLURM_ARRAY_TASK_ID",
+    "SLURM_JOB_NAME",
+    "SLURM_JOB_PARTITION",
+    "SLURM_CLUSTER_NAME",
+    "SLURM_NODELIST",
+    "SLURM_PROCID",
+)
+_GIT_SECONDS = 5.0
+
+
+def gather(model: str = "") -> dict[str, Any]:
+    """Return what `runs/<number>.json` records of a run of this model: plain values for JSON.
+
+    Keys: package (name, version), source (digest of the package's own code), git (commit, dirty;
+    None outside a checkout), python, libraries, machine (host, CPU, cores, system), user, process,
+    command, folder, started (UTC), slurm (those of its variables that are set); model (name and
+    digest of its source) where it is a user's own.
+    """
+    return {
+        "package": {"name": PACKAGE.name, "version": __version__},
+        "source": source_digest(),
+        "git": git_state(PACKAGE.parent),
+        "python": platform.python_version(),
+        "libraries": {name: _version_of(name) for name in _LIBRARIES},
+        "machine": {
+            "host": socket.gethostname(),
+            "cpu": cpu_model(),
+            "cores": os.cpu_count(),
+            "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        },
+        "user": _user(),
+        "process": os.getpid(),
+        "command": list(sys.argv),
+        "folder": os.getcwd(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "slurm": {name: os.environ[name] for name in _SLURM if name in os.environ},
+        **model_source(model),
+    }
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Return a line for each thing that may change numbers and differs between two runs."""
+    lines = []
+    for key in ("package", "source", "model", "python", "libraries"):
+        lines += _lines(key, before.get(key), now.get(key))
+    machines = [run.get("machine") for run in (before, now)]
+    cpus = [machine.get("cpu") if isinstance(machine, dict) else None for machine in machines]
+    return lines + _lines("cpu", *cpus)
+
+
+@cache
+def source_digest() -> str:
+    """Return 16 hexadecimal digits over the names and contents of all modules of the package."""
+    total = blake2b(digest_size=8)
+    for path in sorted(PACKAGE.rglob("*.py")):
+        contents = path.read_bytes()
+        total.update(f"{path.relative_to(PACKAGE).as_posix()}\0{len(contents)}\0".encode())
+        total.update(contents)
+    return total.hexdigest()
+
+
+def git_state(folder: Path) -> dict[str, Any] | None:
+    """Return commit and dirty flag of a checkout whose root is `folder`; None when it is not one.
+
+    Dirty means that tracked files differ from the commit, or that the package holds untracked ones.
+    """
+    if not (folder / ".git").exists():
+        return None
+    command = ["git", "-C", str(folder), "status", "--porcelain=v2", "--branch", "--", PACKAGE.name]
+    try:
+        answer = subprocess.run(
+            command, capture_output=True, text=True, timeout=_GIT_SECONDS, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    lines = answer.stdout.splitlines()
+    oids = re.findall(r"^# branch\.oid ([0-9a-f]+)$", answer.stdout, re.MULTILINE)
+    dirty = any(not line.startswith("#") for line in lines)
+    return {"commit": oids[0] if oids else None, "dirty": dirty}
+
+
+def cpu_model() -> str:
+    """Return the processor's name as the system tells it."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def model_source(model: str) -> dict[str, str]:
+    """Return what to record of a user's model, `package.module:object`; nothing of another one.
+
+    The digest is over the source files of its package, or over that of the module and of those
+    that were imported from the same folder.
+    """
+    module = sys.modules.get(model.partition(":")[0])
+    path = getattr(module, "__file__", None)
+    if ":" not in model or path is None:
+        return {}
+    total = blake2b(digest_size=8)
+    for file in _model_files(model.partition(":")[0], Path(path)):
+        total.update(f"{file.name}\0".encode() + file.read_bytes())
+    return {"model": f"{model}, source {total.hexdigest()}"}
+
+
+def _model_files(module: str, path: Path) -> list[Path]:
+    top = getattr(sys.modules[module.partition(".")[0]], "__path__", None)
+    if top is not None:
+        return sorted(file for folder in top for file in Path(folder).rglob("*.py"))
+    installed = set(sysconfig.get_paths().values())
+    if str(path.parent) in installed:
+        return [path]
+    loaded = (getattr(other, "__file__", None) for other in [*sys.modules.values()])
+    beside = {Path(file) for file in loaded if file and Path(file).parent == path.parent}
+    return sorted({path, *(file for file in beside if file.suffix == ".py")})
+
+
+def _lines(key: str, before: object, now: object) -> list[str]:
+    if isinstance(before, dict) and isinstance(now, dict):
+        names = [*before, *(name for name in now if name not in before)]
+        return [line for n in names for line in _lines(n, before.get(n), now.get(n))]
+    return [] if before == now else [f"{key}: {before} before, {now} now"]
+
+
+def _version_of(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError, ImportError):
+        return str(os.getuid())

@@ -1,0 +1,233 @@
+"""What a store holds: names, shapes, types and units of its arrays, and the room they take.
+
+Light on purpose: a plan is printed without loading Zarr. Per block of points there is one chunk in
+each array of `BLOCK_ARRAYS`; the coordinates, which a plan writes at once, have chunks of
+`COORDINATE_CHUNK` points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.axes import Values
+from chimera_hpc.job.models import parameters_of
+from chimera_hpc.job.parameters import DELTA, SEED
+from chimera_hpc.store.ledger import FIELDS
+
+BLOCK_ARRAYS = ("u", "features", "scalars", "ledger")
+"""Arrays with one chunk a block, in the order in which a block is written."""
+FEATURES = (
+    "amplitude",
+    "frequency",
+    "phase",
+    "baseline",
+    "amplitude_std",
+    "frequency_std",
+    "phase_std",
+    "baseline_std",
+)
+COORDINATE_CHUNK = 250_000
+SCALE = 1e-4
+"""Unit of the int16 series: u = SCALE * stored."""
+MISSING = -32768
+"""Stored value of an int16 sample that is missing or beyond +-3.2767."""
+SMALL_FILE = 4096
+"""Bytes that a metadata file takes, roughly."""
+_OTHER_FILES = 3
+"""Root metadata, its copy, one run."""
+
+_FEATURE_UNITS = ("1", "1/time", "rad", "1") * 2
+_FIELD_UNITS = ("1", "1", "1", "us", "1", "1", "1")
+
+
+@dataclass(frozen=True)
+class ArrayPlan:
+    """One array of the template."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    shape: tuple[int, ...]
+    chunks: tuple[int, ...]
+    dtype: str
+    fill: float
+    attributes: Mapping[str, Any]
+
+    @property
+    def n_chunks(self) -> int:
+        """Number of chunk files when all are written."""
+        return math.prod(-(-n // size) for n, size in zip(self.shape, self.chunks, strict=True))
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one step along the first dimension, before compression."""
+        return np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a sweep takes on the disk when every point is done."""
+
+    blocks: int
+    files: int
+    """Files in the store, claims of running blocks left out."""
+    bytes: int
+    """Upper limit: as if nothing could be compressed."""
+
+
+def scalar_labels(groups: int) -> tuple[str, ...]:
+    """Return the names along `quantity` for a sweep with this number of groups of nodes."""
+    names = ("V_theta", "V_a", "V_Omega", "sigma_1", "sigma_2")
+    others = ("std_u", "range_u", "order_parameter", "distance")
+    return (*names, *others, *(f"local_sigma_{m}" for m in range(1, groups + 1)))
+
+
+def sample_times(sweep: Sweep) -> NDArray[np.float64]:
+    """Return the times of the kept series: multiples of `t_step` from `start` to `t_end`."""
+    step = sweep.integrator.t_step
+    last = math.floor(sweep.integrator.t_end / step + 1e-9)
+    return step * np.arange(last - sweep.n_samples + 1, last + 1, dtype=np.float64)
+
+
+def series_mask(sweep: Sweep, seeds: NDArray[Any]) -> NDArray[np.bool_]:
+    """Tell for points with these seeds whether their series is kept."""
+    if sweep.keep.series == "first-seed":
+        axis = sweep.axes["seed"]
+        assert isinstance(axis, Values)
+        return np.asarray(seeds == axis.values[0])
+    return np.full(len(seeds), sweep.keep.series == "all")
+
+
+def encode_series(u: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
+    """Return a series as it is stored: float32, or int16 steps of `SCALE`.
+
+    Samples that are NaN or beyond +-3.2767 become `MISSING` in int16.
+    """
+    values = np.asarray(u)
+    if np.dtype(dtype) != np.int16:
+        return values.astype(dtype)
+    steps = np.rint(values / SCALE)
+    steps[~(np.abs(steps) <= -(MISSING + 1))] = MISSING
+    return steps.astype(np.int16)
+
+
+def decode_series(stored: NDArray[Any]) -> NDArray[np.float64]:
+    """Return a stored series as float64, NaN where a sample is missing."""
+    if stored.dtype != np.int16:
+        return stored.astype(np.float64)
+    return np.where(stored == MISSING, np.nan, stored * SCALE)
+
+
+def array_plans(
+    sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int
+) -> tuple[ArrayPlan, ...]:
+    """Return all arrays of a store for the points with these columns, coordinates first."""
+    n_points = len(next(iter(columns.values())))
+    others = [_coordinate(sweep, name, column) for name, column in columns.items()]
+    names = " ".join(columns)
+    return (*others, *block_plans(sweep, n_points, block_size, names))
+
+
+def room(sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int) -> Room:
+    """Return how many blocks, files and bytes a finished sweep has."""
+    plans = array_plans(sweep, columns, block_size)
+    blocks = next(plan.n_chunks for plan in plans if plan.name == "ledger")
+    files = sum(plan.n_chunks + 1 for plan in plans) + _OTHER_FILES
+    kept = int(series_mask(sweep, columns["seed"]).sum())
+    size = sum((kept if plan.name == "u" else plan.shape[0]) * plan.row_bytes for plan in plans)
+    return Room(blocks, files, size + SMALL_FILE * (len(plans) + _OTHER_FILES))
+
+
+def block_plans(
+    sweep: Sweep, n_points: int, block_size: int, coordinates: str = ""
+) -> list[ArrayPlan]:
+    """Return the arrays with a chunk a block, and `time` before them where series are kept."""
+
+    def plan(
+        name: str, others: tuple[tuple[str, int], ...], dtype: str, fill: float, **attributes: Any
+    ) -> ArrayPlan:
+        dimensions = ("point", *(dimension for dimension, _ in others))
+        sizes = tuple(size for _, size in others)
+        attributes = {"units": "1", **attributes, "coordinates": coordinates}
+        shape, chunks = (n_points, *sizes), (block_size, *sizes)
+        return ArrayPlan(name, dimensions, shape, chunks, dtype, fill, attributes)
+
+    scalars = scalar_labels(sweep.features.groups)
+    node = ("node", sweep.n_nodes)
+    tables = [
+        plan(
+            "features",
+            (("feature", len(FEATURES)), node),
+            "float64",
+            math.nan,
+            long_name="Fourier features of each node",
+            labels=list(FEATURES),
+            label_units=list(_FEATURE_UNITS),
+        ),
+        plan(
+            "scalars",
+            (("quantity", len(scalars)),),
+            "float64",
+            math.nan,
+            long_name="one number a run: total variations, measures of incoherence",
+            labels=list(scalars),
+            label_units=["1"] * len(scalars),
+        ),
+        plan(
+            "ledger",
+            (("field", len(FIELDS)),),
+            "int64",
+            Status.NEVER,
+            long_name="what became of each point",
+            labels=list(FIELDS),
+            label_units=list(_FIELD_UNITS),
+            status_values=[int(code) for code in Status],
+            status_meanings=[code.sentence for code in Status],
+        ),
+    ]
+    if sweep.keep.series == "none":
+        return tables
+    times = sample_times(sweep)
+    series = plan(
+        "u",
+        (("time", len(times)), node),
+        sweep.keep.dtype,
+        MISSING if sweep.keep.dtype == "int16" else math.nan,
+        long_name="node variable u over the analysis interval",
+        **_series_attributes(sweep),
+    )
+    return [_time(times), series, *tables]
+
+
+def _series_attributes(sweep: Sweep) -> dict[str, Any]:
+    kept = {
+        "all": "every point",
+        "first-seed": "the first seed of each cell; the other points are missing throughout",
+    }[sweep.keep.series]
+    comment = f"kept for {kept}"
+    if sweep.keep.dtype != "int16":
+        return {"comment": comment}
+    limit = -(MISSING + 1) * SCALE
+    comment += f"; samples beyond +-{limit:.4f} do not fit and are stored as missing"
+    return {"comment": comment, "scale_factor": SCALE, "add_offset": 0.0, "_FillValue": MISSING}
+
+
+def _time(times: NDArray[np.float64]) -> ArrayPlan:
+    attributes = {"units": "1", "long_name": "time of the samples of u"}
+    return ArrayPlan("time", ("time",), times.shape, times.shape, "float64", math.nan, attributes)
+
+
+def _coordinate(sweep: Sweep, name: str, column: NDArray[Any]) -> ArrayPlan:
+    known = {"seed": SEED, "delta": DELTA}.get(name) or parameters_of(sweep.model).find(name)
+    attributes = {"units": "1", "long_name": known.text.rstrip(".") if known else name}
+    integer = column.dtype.kind == "i"
+    kind, fill = ("int64", 0) if integer else ("float64", math.nan)
+    chunks = (min(len(column), COORDINATE_CHUNK),)
+    return ArrayPlan(name, ("point",), column.shape, chunks, kind, fill, attributes)

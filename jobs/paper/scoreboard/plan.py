@@ -1,0 +1,60 @@
+"""The jobs of the paper in the order in which they are run, and how --quick thins them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chimera_hpc.job import Sweep
+
+JOBS = (
+    "diagonal",
+    "orientation2",
+    "networks",
+    "networks-2",
+    "synthetic",
+    "stability",
+    "typical",
+    "subclasses",
+    "still",
+    "excitability",
+    "timescale",
+    "robustness-1",
+    "robustness-2",
+    "robustness-random",
+    "robustness-node",
+    "networked",
+    "plane",
+    "basin",
+    "basin-200",
+)
+"""A job comes after those whose atlas it asks for."""
+
+QUICK: dict[str, tuple[str, ...]] = {
+    "diagonal": ("seeds=5",),
+    "orientation2": ("P=[9,12,13,14,15,17,18,22]", "seeds=3"),
+    "stability": ("P=[1,2,6,12]",),
+    "typical": ("seeds=6",),
+    "subclasses": ("P=[7,21]", "seeds=2"),
+    "still": ("seeds=3",),
+    "excitability": ("b=[0.5,2.1]", "seeds=2"),
+    "timescale": ("P=[12]", "epsilon=[0.02,0.05,0.1]", "seeds=3"),
+    "robustness-1": ("flips=[0,160]", "seeds=3"),
+    "robustness-2": ("flips=[0,325]", "seeds=3"),
+    "robustness-random": ("flips=[0]", "seeds=2"),
+    "robustness-node": ("flips=[0]", "seeds=2"),
+    "networked": ("sigma=[0.1,0.15,0.5]", "seeds=2"),
+    "plane": ("P=[10,12]", "seeds=1"),
+    "basin": ("P=[1,20]", "delta=[0.2,0.5,1.2]", "seeds=3"),
+    "basin-200": ("P=[1,20]", "delta=[0.2,0.5,1.2]", "seeds=3"),
+}
+"""Overrides of --quick."""
+
+
+def job_files(folder: str | Path) -> dict[str, Path]:
+    """Return the job files by their names."""
+    return {name: Path(folder) / f"{name}.toml" for name in JOBS}
+
+
+def load(name: str, folder: str | Path, quick: bool = False) -> Sweep:
+    """Return the sweep of a job."""
+    return Sweep.load(job_files(folder)[name], QUICK.get(name, ()) if quick else ())

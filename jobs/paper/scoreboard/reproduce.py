@@ -1,0 +1,202 @@
+"""``scripts/reproduce``: run every job of the paper, judge its claims, write the scoreboard."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.files import write_atomically
+from chimera_hpc.job.shipped import jobs_folder
+from scoreboard.audit_text import audit_text
+from scoreboard.claims import markdown, read_claims, scoreboard, summary
+from scoreboard.evidence import Evidence
+from scoreboard.plan import JOBS, QUICK
+
+_ATLASES = ("diagonal", "orientation2")
+
+_HEAD = """\
+# Claims of the paper
+
+`scripts/reproduce` runs the jobs in `jobs/paper/`, judges the claims of `jobs/paper/claims.toml`
+by the rules in `jobs/paper/scoreboard/rules.py`, and writes this table (claims.md), results.json
+and the figures; `--quick` thins the grids, `--only JOB,...` runs some jobs, `--only none` judges
+what there is. Rules were fixed before the jobs were run; none was changed to suit a result, but for
+one that had counted slow motion without an oscillation as an oscillation (sec. moredetdyn), which
+now has a claim of its own. Fractions have Wilson 95 % intervals.
+"""
+_TRIED = "tried.md"
+"""Beside the claims: what was tried of those that do not reproduce."""
+
+_KEPT = ("audit", "seconds", "cost")
+
+Say = Callable[[str], None]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    args = _parse(arguments)
+    began = time.monotonic()
+    try:
+        names = _chosen(args.only)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return 2
+    folder: Path = args.out.absolute()
+    folder.mkdir(parents=True, exist_ok=True)
+    times = run_jobs(names, folder, args.quick, args.workers, print)
+    failed = [name for name, (status, _) in times.items() if status]
+    audit: dict[str, Any] = {}
+    if not args.no_audit and not failed and names:
+        from scoreboard.audit import audit_jobs
+        from scoreboard.audit_figures import draw_audit
+
+        audit = audit_jobs(folder, names, args.share, args.workers, print)
+        draw_audit(folder, audit)
+    rows = scoreboard(read_claims(args.jobs / "claims.toml"), Evidence(folder))
+    spent = cost(time.monotonic() - began)
+    tried = args.jobs / _TRIED
+    made = {
+        "schema": 1,
+        "quick": args.quick,
+        "claims": rows,
+        "audit": audit,
+        "seconds": {name: seconds for name, (_, seconds) in times.items()},
+        "cost": spent | {"jobs": len(names)} if names else {},
+    }
+    write_scoreboard(folder, made, tried.read_text() if tried.is_file() else "")
+    print(summary(rows))
+    for row in rows:
+        if row["reproduced"] is False:
+            print(f"  not reproduced: {row['id']}: {row['measured']}")
+    print(f"scoreboard  {folder / 'claims.md'}, {folder / 'results.json'}")
+    print(f"{spent['minutes']:.1f} minutes, {spent['cpu_minutes']:.1f} of processor time")
+    for name in failed:
+        print(f"failed: {name}, exit status {times[name][0]}; see {folder / name}.log")
+    return 1 if failed else 0
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="scripts/reproduce",
+        description="Rebuild what the paper computes, and say claim by claim what reproduces. "
+        "The same command again goes on where it stopped.",
+    )
+    parser.add_argument("--quick", action="store_true", help="thinned grids, a few minutes")
+    parser.add_argument("--out", type=Path, default=Path("results/paper"), metavar="DIR")
+    parser.add_argument("--only", metavar="JOB,...", help='these jobs; "none": judge what there is')
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N")
+    parser.add_argument(
+        "--share", type=float, default=0.02, help="share of the points that the audit runs again"
+    )
+    parser.add_argument("--no-audit", action="store_true", help="leave the audit out")
+    jobs = jobs_folder() / "paper"
+    parser.add_argument("--jobs", type=Path, default=jobs, help=argparse.SUPPRESS)
+    return parser.parse_args(arguments)
+
+
+def _chosen(only: str | None) -> list[str]:
+    if only is None:
+        return list(JOBS)
+    names = [] if only == "none" else only.split(",")
+    for name in names:
+        if name not in JOBS:
+            raise BadInput(f"--only {name}: not a job of the paper; known: {', '.join(JOBS)}")
+    return [name for name in JOBS if name in names]
+
+
+def run_jobs(
+    names: Sequence[str], folder: Path, quick: bool, workers: int, say: Say
+) -> dict[str, tuple[int, float]]:
+    """Run jobs, each a process of its own; return exit status and seconds by name.
+
+    Full jobs follow each other, all workers in one; thinned ones, too short for that, run side by
+    side, those whose classes judge the others before them.
+    """
+    if not quick:
+        return dict(_run(name, folder, False, workers, say) for name in names)
+    done: dict[str, tuple[int, float]] = {}
+    for stage in (
+        [name for name in names if name in _ATLASES],
+        [name for name in names if name not in _ATLASES and name != "robustness-2"],
+        [name for name in names if name == "robustness-2"],
+    ):
+        with ThreadPoolExecutor(max_workers=max(workers, 1)) as pool:
+            done |= dict(pool.map(lambda name: _run(name, folder, True, 1, say), stage))
+    return done
+
+
+def _run(
+    name: str, folder: Path, quick: bool, workers: int, say: Say
+) -> tuple[str, tuple[int, float]]:
+    began = time.monotonic()
+    place = ["--cluster", "serial"] if quick else ["--workers", str(workers)]
+    settings = [word for text in (QUICK.get(name, ()) if quick else ()) for word in ("--set", text)]
+    job = jobs_folder() / "paper" / f"{name}.toml"
+    command = [sys.executable, "-P", "-m", "chimera_hpc.sweep", "run", str(job)]
+    with (folder / f"{name}.log").open("w") as log:
+        ended = subprocess.run(
+            [*command, "--out", str(folder / name), *place, *settings],
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            check=False,
+        )
+    seconds = time.monotonic() - began
+    say(f"{name:20s} {seconds:7.1f} s" + (f"  exit {ended.returncode}" if ended.returncode else ""))
+    return name, (ended.returncode, seconds)
+
+
+def cost(seconds: float) -> dict[str, float]:
+    """Return what this call has used so far: wall and processor time, and how busy the machine is.
+
+    Processor time is that of this process and of those it has waited for.
+    """
+    used = [resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return {
+        "minutes": seconds / 60.0,
+        "cpu_minutes": sum(one.ru_utime + one.ru_stime for one in used) / 60.0,
+        "processors": os.cpu_count() or 1,
+        "load": os.getloadavg()[2],
+    }
+
+
+def write_scoreboard(folder: Path, made: dict[str, Any], notes: str = "") -> None:
+    """Write results.json and claims.md of the whole reproduction; `notes` are its last section."""
+    from chimera_hpc.reduction.results import to_json
+
+    # A call that only judges, or runs some jobs, keeps what is known of the others.
+    try:
+        known = json.loads((folder / "results.json").read_text())
+        made = made | {key: known.get(key, {}) | made[key] for key in _KEPT}
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
+        pass
+    write_atomically(folder / "results.json", to_json(made).encode())
+    parts = [_HEAD, f"{summary(made['claims'])}.\n", *_cost_line(made["cost"])]
+    parts.append(markdown(made["claims"]))
+    if made["audit"]:
+        parts.append(f"## Audit of the labels\n\n{audit_text(made['audit'])}")
+    text = "\n".join([*parts, notes] if notes else parts)
+    write_atomically(folder / "claims.md", text.encode())
+
+
+def _cost_line(spent: dict[str, float]) -> list[str]:
+    if not spent:
+        return []
+    return [
+        f"The last call that ran jobs ran {spent['jobs']} in {spent['minutes']:.0f} minutes of "
+        f"wall time and {spent['cpu_minutes']:.0f} of processor time, on {spent['processors']} "
+        f"processors that {spent['load']:.1f} processes wanted at the end (mean of 15 minutes).\n"
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,377 @@
+"""``run`` and ``retry``: failures, damage, provenance, stopping, and what is said of them."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.run import driver as driving
+from chimera_hpc.run import work
+from chimera_hpc.run.block import run_block
+from chimera_hpc.run.executors import ClusterLost
+from chimera_hpc.store.block_result import BlockResult, failed_block
+from chimera_hpc.store.ledger import read_ledger
+from chimera_hpc.store.store import Store
+
+Run = Callable[..., tuple[int, str, str]]
+SERIAL = ("--cluster", "serial", "--no-figures")
+
+
+def run_words(job: Path, folder: Path, *options: str) -> list[object]:
+    return ["run", job, "--out", folder, *SERIAL, *options]
+
+
+def failing(
+    monkeypatch: pytest.MonkeyPatch, status: Status, which: Callable[[dict[str, Any]], bool]
+) -> list[int]:
+    """Have some points fail; return the list of the sizes of calls."""
+    sizes: list[int] = []
+
+    def run(sweep: Sweep, points: Points, should_stop: Any = None) -> BlockResult:
+        sizes.append(len(points))
+        result = run_block(sweep, points, should_stop=should_stop)
+        lost = failed_block(sweep, points, status)
+        for i in range(len(points)):
+            if which(points.row(i)):
+                result.status[i] = status
+                result.features[i], result.scalars[i] = lost.features[i], lost.scalars[i]
+        return result
+
+    monkeypatch.setattr(work, "run_block", run)
+    return sizes
+
+
+def attempts(folder: Path) -> dict[int, int]:
+    """Return status -> attempts of its points."""
+    ledger = read_ledger(folder / "store.zarr")
+    return dict(zip(ledger["status"].tolist(), ledger["attempts"].tolist(), strict=True))
+
+
+def store_of(folder: Path) -> Store:
+    return Store.open(folder / "store.zarr")
+
+
+def test_time_outs_are_tried_again_within_the_attempts_and_then_remain(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = failing(monkeypatch, Status.TIME_OUT, lambda row: row["seed"] == 1 and row["P"] == 3)
+    words = run_words(job, tmp_path / "out", "--set", "run.attempts=3")
+    code, out, _ = sweep(*words)
+    assert code == 1
+    assert "1 points failed:\n  P=3 Q=3 seed=1: time-out" in out
+    assert sizes == [4, 4, 4, 3, 1, 1]
+    assert attempts(tmp_path / "out")[Status.TIME_OUT] == 3
+    assert sweep(*words)[0] == 1
+    assert sizes == [4, 4, 4, 3, 1, 1]
+
+
+def test_numerical_failures_are_not_tried_again(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = failing(monkeypatch, Status.NON_FINITE, lambda row: row["seed"] == 1)
+    code, out, _ = sweep(*run_words(job, tmp_path / "out"))
+    assert code == 1
+    assert "3 points failed:" in out
+    assert sizes == [4, 4, 4, 3]
+
+
+def test_many_failures_are_listed_in_part_and_where_to_find_the_rest(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failing(monkeypatch, Status.NON_FINITE, lambda row: True)
+    code, out, _ = sweep(*run_words(job, tmp_path / "out", "--set", "seeds=10"))
+    assert code == 1
+    assert len(re.findall(r"^  P=\d Q=\d seed=\d: non-finite", out, re.MULTILINE)) == 20
+    assert f"and 10 more: status --failures {tmp_path / 'out'}" in out
+    code, out, _ = sweep("status", tmp_path / "out", "--failures")
+    assert code == 1
+    assert len(re.findall(r"^  P=\d Q=\d seed=\d: non-finite", out, re.MULTILINE)) == 30
+
+
+def test_retry_computes_the_failed_points_once_and_no_others(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    failing(monkeypatch, Status.NON_FINITE, lambda row: row["seed"] == 1)
+    sweep(*run_words(job, out))
+    sizes = failing(monkeypatch, Status.TIME_OUT, lambda row: row["seed"] == 1 and row["P"] == 2)
+    assert sweep("retry", out, *SERIAL)[0] == 1
+    assert sizes == [1, 1, 1]
+    monkeypatch.setattr(work, "run_block", run_block)
+    assert sweep("retry", out, *SERIAL, "--status", "non_finite")[0] == 1
+    code, _, err = sweep("retry", out, *SERIAL, "--status", "time_out,non_finite")
+    assert code == 0
+    assert "1 of 4 blocks to do" in err
+    ledger = read_ledger(out / "store.zarr")
+    assert ledger["attempts"][1] == 3
+    assert ledger["run"].tolist().count(1) == 12
+
+
+def test_retry_takes_settings_and_limits_of_its_own(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    seen = []
+
+    def run(sweep: Sweep, points: Points, should_stop: Any = None) -> BlockResult:
+        seen.append((sweep.run.tighten, sweep.integrator.max_steps))
+        return failed_block(sweep, points, Status.STEP_BUDGET)
+
+    monkeypatch.setattr(work, "run_block", run)
+    sweep(*run_words(job, out, "--block", "15"))
+    sweep("retry", out, *SERIAL, "--max-steps", "77", "--set", "run.tighten=0.5")
+    assert seen == [(0.1, 10_000_000), (0.5, 77)]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--status", "time-out"], "did you mean time_out?"),
+        (["--time-out", "-1"], "--time-out -1.0: must be above 0"),
+        (["--max-steps", "0"], "--max-steps 0: must be above 0"),
+        (["--set", "integrator.rtol=1e-5"], "integrator.rtol: 1e-05 here, 0.001 in the store"),
+    ],
+)
+def test_retry_refuses_what_it_cannot_use(
+    words: list[str], message: str, finished: Path, sweep: Run
+) -> None:
+    code, _, err = sweep("retry", finished, *SERIAL, *words)
+    assert code == 2
+    assert message in err
+    assert len(err.splitlines()) == 1
+
+
+def test_damage_found_by_the_reduction_is_computed_anew(
+    job: Path, finished: Path, sweep: Run
+) -> None:
+    before = store_of(finished).ledger()
+    chunk = finished / "store.zarr" / "scalars" / "c.1.0"
+    data = bytearray(chunk.read_bytes())
+    data[40] ^= 4
+    chunk.write_bytes(data)
+    code, out, _ = sweep(*run_words(job, finished))
+    assert code == 0
+    assert "damaged, to be computed anew: block 1, scalars: wrong checksum" in out
+    after = store_of(finished).ledger()
+    assert (after["digest"] == before["digest"]).all()
+    assert after["run"].tolist() == [1] * 4 + [2] * 4 + [1] * 7
+
+
+def test_reduce_of_a_damaged_store_is_one_line(finished: Path, sweep: Run) -> None:
+    (finished / "store.zarr" / "scalars" / "c.1.0").unlink()
+    code, _, err = sweep("reduce", finished)
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "block 1, scalars: missing" in err
+
+
+def change_provenance(folder: Path, **changes: Any) -> None:
+    record = folder / "store.zarr" / "runs" / "1.json"
+    record.write_text(json.dumps({**json.loads(record.read_bytes()), **changes}))
+
+
+def test_other_code_is_warned_of_and_its_points_are_marked(
+    job: Path, finished: Path, sweep: Run
+) -> None:
+    change_provenance(finished, source="feedbeef00000000")
+    (finished / "store.zarr" / "ledger" / "c.0.0").unlink()
+    code, _, err = sweep(*run_words(job, finished))
+    assert code == 0
+    assert "warning: run 1 had other source: feedbeef00000000 before" in err
+    assert store_of(finished).ledger()["run"].tolist() == [2] * 4 + [1] * 11
+
+
+def test_strict_refuses_other_code_and_leaves_everything(
+    job: Path, finished: Path, sweep: Run
+) -> None:
+    change_provenance(finished, python="2.7.18")
+    (finished / "store.zarr" / "ledger" / "c.0.0").unlink()
+    code, _, err = sweep(*run_words(job, finished, "--strict"))
+    assert code == 2
+    assert "--strict: run 1 had other python: 2.7.18 before" in err
+    assert sorted(os.listdir(finished / "store.zarr" / "runs")) == ["1.json", "1.work.json"]
+
+
+def test_strict_has_nothing_against_the_same_code(job: Path, finished: Path, sweep: Run) -> None:
+    (finished / "store.zarr" / "ledger" / "c.0.0").unlink()
+    assert sweep(*run_words(job, finished, "--strict"))[0] == 0
+
+
+def test_full_disk_is_one_line_and_more_to_do(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, count = Store.write_block, 0
+
+    def filling(*args: Any, **options: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count > 2:
+            raise OSError(errno.ENOSPC, "No space left on device", "u/c.2")
+        return write(*args, **options)
+
+    monkeypatch.setattr(Store, "write_block", filling)
+    code, out, err = sweep(*run_words(job, tmp_path / "out"))
+    assert code == 75
+    assert "stopped: No space left on device (u/c.2)" in err
+    assert "stopped: 7 of 15 points left; to go on:" in out
+    assert count == 3
+    monkeypatch.undo()
+    assert sweep(*run_words(job, tmp_path / "out"))[0] == 0
+    assert set(read_ledger(tmp_path / "out" / "store.zarr")["attempts"].tolist()) == {1}
+
+
+def test_error_of_a_network_file_system_is_tried_again(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, count = Store.write_block, 0
+
+    def shaky(*args: Any, **options: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count in (1, 2):
+            raise OSError(errno.ESTALE, "Stale file handle")
+        return write(*args, **options)
+
+    monkeypatch.setattr(Store, "write_block", shaky)
+    assert sweep(*run_words(job, tmp_path / "out"))[0] == 0
+
+
+def test_block_that_cannot_be_done_is_put_aside_and_told_of(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(sweep: Sweep, points: Points, should_stop: Any = None) -> BlockResult:
+        if (points.columns["seed"] == 4).any() and (points.columns["P"] == 3).any():
+            raise LookupError("no such thing")
+        return run_block(sweep, points)
+
+    monkeypatch.setattr(work, "run_block", run)
+    code, out, _ = sweep(*run_words(job, tmp_path / "out"))
+    assert code == 1
+    assert "block 2 could not be done: point P=3 Q=3 seed=4: LookupError: no such thing" in out
+    assert read_ledger(tmp_path / "out" / "store.zarr")["status"].tolist().count(255) == 1
+    assert "Traceback" in (tmp_path / "out" / "run.log").read_text()
+
+
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Signals as in a terminal: `nohup`, or a shell's background, has had some of them ignored."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in usual.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("heard")
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 75), (signal.SIGHUP, 75)]
+)
+def test_signal_stops_in_good_order(
+    number: int,
+    status: int,
+    job: Path,
+    tmp_path: Path,
+    sweep: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def run(sweep: Sweep, points: Points, should_stop: Any = None) -> BlockResult:
+        os.kill(os.getpid(), number)
+        return run_block(sweep, points, should_stop=should_stop)
+
+    monkeypatch.setattr(work, "run_block", run)
+    before = signal.getsignal(number)
+    words = run_words(job, tmp_path / "out")
+    code, out, _ = sweep(*words)
+    assert code == status
+    assert "stopped: 15 of 15 points left; to go on:" in out
+    assert "-m chimera_hpc.sweep run" in out
+    assert signal.getsignal(number) == before
+    assert not list((tmp_path / "out" / "store.zarr" / "runs").glob("*.stop"))
+    monkeypatch.undo()
+    assert sweep(*words)[0] == 0
+
+
+@pytest.mark.usefixtures("heard")
+def test_second_interrupt_breaks_off_at_once(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(sweep: Sweep, points: Points, should_stop: Any = None) -> BlockResult:
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+        raise AssertionError("not reached")
+
+    monkeypatch.setattr(work, "run_block", run)
+    code, out, _ = sweep(*run_words(job, tmp_path / "out"))
+    assert code == 130
+    assert "broken off; to go on:" in out
+    monkeypatch.undo()
+    assert sweep(*run_words(job, tmp_path / "out"))[0] == 0
+
+
+def test_cluster_that_is_lost_is_started_again_and_in_the_end_given_up(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = []
+
+    @contextmanager
+    def cluster(driver: driving.Driver, patience: float) -> Iterator[None]:
+        started.append(patience)
+        yield None
+
+    def lost(*_: Any) -> None:
+        raise ClusterLost("the scheduler is gone")
+
+    monkeypatch.setattr(driving.Driver, "_cluster", cluster)
+    monkeypatch.setattr("chimera_hpc.run.executors.run_dask", lost)
+    code, out, err = sweep("run", job, "--out", tmp_path / "out", "--no-figures")
+    assert code == 75
+    assert started == [60.0, 60.0, 60.0]
+    assert "the cluster is lost (the scheduler is gone), 3 of 3 times" in err
+    assert "15 of 15 points left" in out
+
+
+def test_driver_that_plans_a_moment_too_late_takes_the_store_that_is_there(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = Store.plan
+
+    def late(path: Path, spec: Sweep) -> Store:
+        plan(path, spec)
+        return plan(path, spec)
+
+    monkeypatch.setattr(Store, "plan", late)
+    assert sweep(*run_words(job, tmp_path / "out"))[0] == 0
+
+
+def test_absurd_plan_is_refused_unless_it_is_meant(job: Path, tmp_path: Path, sweep: Run) -> None:
+    absurd = ("--set", "seeds=1000000", "--block", "1", "--set", "keep.series=none")
+    code, out, err = sweep("plan", job, *absurd)
+    assert code == 2
+    assert "points      3000000" in out
+    assert "files are more than 500000" in err
+    assert "--yes if that is meant" in err
+    assert sweep("plan", job, *absurd, "--yes")[0] == 0
+    code, _, err = sweep(*run_words(job, tmp_path / "out", *absurd))
+    assert code == 2
+    assert "files are more than 500000" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_plan_that_does_not_fit_on_the_disk_is_refused(
+    job: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("chimera_hpc.cli.estimate.free_bytes", lambda folder: 1000)
+    code, _, err = sweep("plan", job)
+    assert code == 2
+    assert "may be needed, 1 kB are free" in err

@@ -1,0 +1,84 @@
+"""Memory of the stepping loop: whole cache lines, lent to one at a time."""
+
+from __future__ import annotations
+
+from threading import Thread
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from kernel_tools import System, powers, run_all
+
+from chimera_hpc.integrate.lanes import Control, integrate
+from chimera_hpc.integrate.scratch import aligned, lent
+from chimera_hpc.integrate.simd import LANES
+
+DECAY = System(powers, np.array([-1.0, 1.0]), 2)
+STARTS = [np.array([1.0 + i, -1.0 - i]) for i in range(LANES)]
+
+
+@given(st.integers(1, 40), st.integers(1, 40))
+def test_state_begins_on_a_cache_line(rows, lanes):
+    array = aligned(rows, lanes)
+    assert array.shape == (rows, lanes)
+    assert array.ctypes.data % 64 == 0
+    assert array.flags.c_contiguous
+    assert not array.any()
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=4))
+def test_room_is_the_same_memory_as_before_where_that_is_enough(sizes):
+    with lent(40 * 40) as largest:
+        address = largest.ctypes.data
+    for size in sizes:
+        with lent(size, 40) as room:
+            assert room.shape == (size, 40)
+            assert room.flags.c_contiguous
+            assert room.ctypes.data == address
+    with lent(10**6) as larger:
+        assert larger.ctypes.data % 64 == 0
+        larger[-1] = 1.0
+
+
+def test_room_that_is_lent_is_lent_to_nobody_else():
+    found = []
+
+    def ask():
+        with lent(100) as room:
+            found.append(room)
+
+    with lent(100) as mine:
+        ask()
+        thread = Thread(target=ask)
+        thread.start()
+        thread.join()
+        assert not any(np.shares_memory(mine, room) for room in found)
+
+
+def test_room_comes_back_from_work_that_failed():
+    with pytest.raises(ValueError, match="its work failed"), lent(100) as room:
+        raise ValueError("its work failed")
+    with lent(100) as again:
+        assert again.ctypes.data == room.ctypes.data
+
+
+def test_samples_do_not_depend_on_who_used_the_room_before():
+    long, short = Control(1.0, 0.0, 0.001), Control(1.0, 0.0, 0.1)
+    first = run_all([DECAY] * LANES, STARTS, short, lanes=LANES)
+    run_all([DECAY] * LANES, STARTS[::-1], long, lanes=LANES)
+    again = run_all([DECAY] * LANES, STARTS, short, lanes=LANES)
+    assert [run.bits for run in first] == [run.bits for run in again]
+
+
+def test_an_integration_within_another_leaves_its_samples_alone():
+    control, kept = Control(1.0, 0.0, 0.1), {}
+
+    def on_end(number, outcome):
+        run_all([DECAY] * LANES, STARTS[::-1], control, lanes=LANES)
+        kept[number] = outcome.samples.copy()
+
+    integrate([DECAY] * LANES, STARTS, control, 2, on_end, lanes=LANES)
+    alone = run_all([DECAY] * LANES, STARTS, control, lanes=LANES)
+    for number, run in enumerate(alone):
+        np.testing.assert_array_equal(kept[number], run.samples)

@@ -1,0 +1,60 @@
+"""Bad input to the Fourier method: one line that says what, where and what is allowed."""
+
+import numpy as np
+import pytest
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.measures import fourier_features
+
+T = np.arange(2001) * 0.01
+U = np.cos(4 * np.pi * T[:, None] + np.arange(3))
+
+
+def broken(array, index, value):
+    copy = array.copy()
+    copy[index] = value
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("t", "u", "options", "message"),
+    [
+        (T, U, {"n_share": 10}, r"n_share must be in 0 \.\. n_peaks - 1 = 9, not 10"),
+        (T, U, {"n_share": -1}, "n_share must be in"),
+        (T, U, {"n_peaks": 2, "n_share": 0}, "n_peaks must be at least 3, not 2"),
+        (T, U, {"n_peaks": 9.5}, "n_peaks must be a whole number, not 9.5"),
+        (T, U, {"clock_node": 3}, r"clock_node must be in 0 \.\. 2, not 3"),
+        (T, U, {"clock_node": -1}, "clock_node must be in"),
+        (T, U, {"clock": "moon"}, "clock must be one of ring, own, not 'moon'"),
+        (T, U, {"phase_mean": "mean"}, "phase_mean must be one of circular, arithmetic"),
+        (T, U, {"refine": "no"}, "refine must be one of parabola, sine-fit"),
+        (T, U, {"time_origin": "0"}, "time_origin must be one of window, absolute"),
+        (T, U, {"still": -1.0}, "still must be a finite number >= 0"),
+        (T, U, {"still": float("nan")}, "still must be"),
+        (T[:-1], U, {}, r"t must have shape \(2001,\), one time a row of u, not \(2000,\)"),
+        (T[:, None], U, {}, "t must have shape"),
+        (T, U[:, 0], {}, r"u must have shape \(times, nodes\), not \(2001,\)"),
+        (T, U[:, :0], {}, "u must have shape"),
+        (T, U.T, {}, "t must have shape"),
+        (T[:2], U[:2], {}, "at least 3 times, not 2"),
+        (T[::-1], U, {}, "t must be finite and rise"),
+        (broken(T, -1, np.inf), U, {}, "t must be finite and rise"),
+        (broken(T, 700, np.nan), U, {}, "t must be uniform"),
+        (broken(T, 700, 7.0002), U, {}, r"uniform: a time is 0\.02 steps off, allowed is 0\.01"),
+        (T**1.01, U, {}, "t must be uniform"),
+        (T, broken(U, (5, 1), np.nan), {}, "u must be finite, its squares too: node 1"),
+        (T, broken(U, (5, 2), np.inf), {}, "u must be finite, its squares too: node 2"),
+        (T, broken(U, (5, 2), 1e200), {}, "u must be finite, its squares too: node 2"),
+        (T, [["x"] * 3] * 2001, {}, "u must be an array of real numbers"),
+        (T, [[1.0], [2.0, 3.0]], {}, "u must be an array of real numbers"),
+    ],
+)
+def test_bad_input_is_named(t, u, options, message):
+    with pytest.raises(BadInput, match=message) as caught:
+        fourier_features(t, u, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_times_off_by_less_than_a_hundredth_of_a_step_are_uniform():
+    rounded = T + 0.4e-4 * np.random.default_rng(0).uniform(-1, 1, T.size)
+    assert fourier_features(rounded, U).n_windows > 0

@@ -1,0 +1,216 @@
+"""The figures of a sweep: which are drawn, when, and what is on them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import classify
+from chimera_hpc.job import selection
+from chimera_hpc.plot import catalogue as figures
+from chimera_hpc.plot.catalogue import choose, is_figure_name
+from chimera_hpc.plot.curves import CURVE_FIGURES
+from chimera_hpc.plot.outcome import Outcome, Run
+from chimera_hpc.plot.style import BLACK, BLUE, RED
+
+CENTRES = np.array([[0.05, 0.01, 0.001], [0.3, 0.1, 0.11], [0.55, 0.02, 0.01]])
+NAMES = ("ordered", "chimera", "disordered")
+T = np.arange(0.0, 20.0, 0.02)
+
+
+def run(place="$P = Q = 12$, seed 0", frequency=4.0, **changes):
+    u = np.sin(2.0 * np.pi * frequency * T[:, None] + np.arange(8))
+    features = np.full((8, 8), 0.1)
+    features[1] = frequency
+    made = Run(place, T, u, "disordered", features, np.array([0.575, 0.018, 0.012]))
+    return replace(made, **changes)
+
+
+def outcome(n_axes=1, status=Status.DONE, **changes):
+    """Nine cells with two runs each: three cells of each class."""
+    rng = np.random.default_rng(0)
+    triplets = CENTRES[np.repeat([0, 1, 2], 6)] * rng.uniform(0.9, 1.1, (18, 3))
+    made = classify(triplets, np.full(18, int(status)), cuts=(3, 5))
+    oscillates = status is Status.DONE
+    classes = [name if oscillates else "steady" for name in np.repeat(NAMES, 3).tolist()]
+    cells = [{"class": name, "votes": {name: 2}} for name in classes]
+    columns = [("$P = Q$", np.arange(2, 11)), ("$b$", np.tile([0.1, 0.2, 0.3], 3))]
+    columns.append(("$c$", np.arange(9.0)))
+    axes = columns[:n_axes]
+    return Outcome(made, triplets, axes, {k: cells for k in made.cuts}, **changes)
+
+
+def colours_of_points(axes):
+    return {to_hex(colour) for dots in axes.collections for colour in dots.get_facecolors()}
+
+
+def test_registry_has_the_names_that_a_job_may_use():
+    assert tuple(figures.FIGURES) == (*selection.FIGURES, *selection.CURVE_FIGURES)
+    assert tuple(figures.CUT_FIGURES) == selection.CUT_FIGURES
+
+
+def test_auto_draws_the_first_cut_in_every_way_and_the_composite_of_each():
+    names = list(choose("auto", [4, 3, 5]))
+    assert names[:3] == ["space_time", "indicators", "whole_run"]
+    assert names[-6:] == [
+        "dendrogram_4", "projections_4", "modal_classes_4",
+        "classification_4", "classification_3", "classification_5",
+    ]  # fmt: skip
+    assert set(names[3:-6]) == set(CURVE_FIGURES)
+
+
+def test_list_of_figures_draws_these_and_no_others():
+    chosen = choose(("projections", "space_time", "dendrogram_5", "dendrogram_4"), [3, 5])
+    assert list(chosen) == [
+        "projections_3", "projections_5", "space_time", "dendrogram_5", "dendrogram_4",
+    ]  # fmt: skip
+    assert [name for name, make in chosen.items() if make is None] == ["dendrogram_4"]
+
+
+def test_numbered_figure_shows_that_cut():
+    make = choose(("projections_5",), [3, 5])["projections_5"]
+    data = outcome()
+    legend = make(data).axes[0].get_legend()
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == list(data.classification.cuts[5].names)
+    assert len(names) == 5
+
+
+@pytest.mark.parametrize("name", [*figures.FIGURES, "dendrogram_3", "classification_12"])
+def test_own_files_are_recognised(name):
+    assert is_figure_name(name)
+
+
+@pytest.mark.parametrize("name", ["dendrogram", "my_notes", "space_time_3", "photo_3"])
+def test_files_of_others_are_not_taken_for_own(name):
+    assert not is_figure_name(name)
+
+
+def test_space_time_shows_each_run_over_a_close_up_of_twelve_periods():
+    drawn = figures.draw_space_time(outcome(shown=[run("one"), run("two", 2.0)]))
+    images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
+    assert len(images) == 4
+    starts = [round(float(image.get_extent()[0]), 1) for image in images]
+    assert starts == [0.0, 0.0, 17.0, 14.0]  # periods of 0.25 and 0.5
+
+
+@pytest.mark.parametrize("draw", [figures.draw_space_time, figures.draw_indicators])
+def test_titles_of_neighbours_stay_apart(draw):
+    drawn = draw(outcome(shown=[run("$P = Q = 21$, $\\epsilon = 0.05$, seed 0")] * 3))
+    drawn.draw_without_rendering()
+    titles = [text for axes in drawn.axes if (text := axes._left_title).get_text()]
+    boxes = [text.get_window_extent() for text in titles]
+    assert len(boxes) == 3
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert max(box.x1 for box in boxes) <= drawn.bbox.x1
+    assert titles[2].get_text().startswith("(c)  $P = Q = 21$")
+    assert "\ndisordered" in titles[2].get_text()
+
+
+def test_times_of_neighbours_stay_apart():
+    drawn = figures.draw_space_time(outcome(shown=[run(t=T + 980.0, frequency=1.17)] * 3))
+    drawn.draw_without_rendering()
+    panels = [axes for axes in drawn.axes if axes.get_images()]
+    boxes = [
+        label.get_window_extent()
+        for axes in panels
+        for place, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        if axes.get_xlim()[0] <= place <= axes.get_xlim()[1]
+    ]
+    assert len(boxes) > 6
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+
+
+def test_indicators_tell_the_variations_and_leave_out_still_runs():
+    still = run(features=None, triplet=None)
+    drawn = figures.draw_indicators(outcome(shown=[still, run()]))
+    assert len(drawn.axes) == 3
+    assert drawn.axes[0].get_title().endswith("$V$ = (0.575, 0.018, 0.012)")
+    (dots,) = drawn.axes[2].lines
+    np.testing.assert_array_equal(dots.get_ydata(), np.full(8, 4.0))
+
+
+def test_slow_run_beside_a_fast_one_is_drawn_over_half_of_its_series():
+    drawn = figures.draw_space_time(outcome(shown=[run("one"), run("slow", 0.1)]))
+    images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
+    starts = [round(float(image.get_extent()[0]), 1) for image in images]
+    assert starts == [0.0, 0.0, 17.0, 10.0]
+
+
+def test_still_run_has_no_close_up():
+    still = run(features=None, triplet=None, class_name="steady")
+    drawn = figures.draw_space_time(outcome(shown=[still]))
+    assert sum(bool(axes.get_images()) for axes in drawn.axes) == 1
+
+
+def test_whole_run_is_drawn_from_its_begin_to_its_end():
+    drawn = figures.draw_whole_run(outcome(whole=[run(class_name="")]))
+    left, right, *_ = drawn.axes[0].get_images()[0].get_extent()
+    assert (left, right) == pytest.approx((T[0], T[-1]), abs=0.02)
+    assert drawn.axes[0].get_title() == "$P = Q = 12$, seed 0"
+
+
+def test_modal_classes_go_against_one_axis_or_over_two():
+    line = figures.draw_modal_classes(outcome(1), 3).axes[0]
+    assert line.get_xlabel() == "$P = Q$"
+    assert [tick.get_text() for tick in line.get_yticklabels()] == list(NAMES)
+    plane = figures.draw_modal_classes(outcome(2), 3).axes[0]
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("$P = Q$", "$b$")
+    assert colours_of_points(plane) == {RED, BLUE, BLACK}
+
+
+def test_composite_has_tree_plane_and_classes():
+    for n_axes, label in ((1, ""), (2, "$b$")):
+        tree, plane, classes = figures.draw_classification(outcome(n_axes), 3).axes
+        assert tree.get_xlabel() == "18 runs"
+        assert colours_of_points(plane) == {RED, BLUE, BLACK}
+        assert classes.get_ylabel() == label
+
+
+def test_dendrogram_has_the_line_of_its_cut():
+    data = outcome()
+    for k, cut in data.classification.cuts.items():
+        line = figures.draw_dendrogram(data, k).axes[0].lines[0]
+        assert line.get_ydata()[0] == cut.depth
+
+
+@pytest.mark.parametrize(("n_axes", "titles"), [(1, [""]), (2, ["$P = Q = 2$", "$P = Q = 3$"])])
+def test_judged_cells_are_diamonds_in_a_panel_for_each_value_of_the_first_axis(n_axes, titles):
+    made = outcome(n_axes)
+    cells = [{"triplet": CENTRES[i % 3].tolist()} for i in range(9)]
+    ground = {"triplets": CENTRES.tolist(), "labels": [0, 1, 2], "names": list(NAMES)}
+    curves = {"atlas": {"judges": {"diagonal": cells}, "background": ground}}
+    axes = list(made.axes)
+    if n_axes == 2:
+        axes[0] = ("$P = Q$", np.repeat([2, 3], [4, 5]))
+    panels = CURVE_FIGURES["atlas"](replace(made, curves=curves, axes=axes)).axes[: len(titles)]
+    for panel, title in zip(panels, titles, strict=True):
+        assert panel.get_title(loc="left").endswith(title)
+    diamonds = [len(panel.collections[-1].get_offsets()) for panel in panels]
+    assert diamonds == ([9] if n_axes == 1 else [4, 5])
+
+
+@pytest.mark.parametrize("n_axes", [0, 3])
+def test_classes_are_not_drawn_over_no_axis_or_three(n_axes):
+    data = outcome(n_axes)
+    assert figures.draw_modal_classes(data, 3) is None
+    assert figures.draw_classification(data, 3) is None
+    assert figures.draw_dendrogram(data, 3) is not None
+
+
+def test_sweep_without_oscillation_has_its_classes_only():
+    data = outcome(status=Status.STEADY)
+    for draw in (figures.draw_dendrogram, figures.draw_projections, figures.draw_classification):
+        assert draw(data, 3) is None
+    rows = figures.draw_modal_classes(data, 3).axes[0].get_yticklabels()
+    assert [row.get_text() for row in rows] == ["steady"]
+
+
+@pytest.mark.parametrize("draw", figures.FIGURES.values(), ids=figures.FIGURES)
+def test_nothing_to_show_is_no_figure(draw):
+    assert draw(outcome()) is None

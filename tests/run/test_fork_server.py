@@ -1,0 +1,279 @@
+"""The fork server: what workers get from it, and that it is there only when it is wanted."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from chimera_hpc.cli.main import main, needs_workers
+from chimera_hpc.run import fork_server
+
+JOB = """
+name = "small"
+model = "topological_fhn"
+[grid]
+P = "2:4"
+Q = "P"
+seeds = 20
+[fixed]
+n_nodes = 12
+[integrator]
+t_end = 4000.0
+t_step = 0.1
+[features]
+start = 3900.0
+n_peaks = 3
+n_share = 1
+[run]
+block = 4
+"""
+LOOK = """
+import json, os, signal, sys
+from pathlib import Path
+from chimera_hpc.run.local_cluster import local_cluster
+from chimera_hpc.run.fork_server import fork_server
+
+def look():
+    from numba.core.registry import cpu_target
+    server = Path(f"/proc/{os.getppid()}")
+    return {
+        "server": "def look" not in (server / "cmdline").read_text(),
+        "threads of the server": len(list((server / "task").iterdir())),
+        # Dask marks its children, for the sake of their titles.
+        "environment": {k: v for k, v in os.environ.items() if k != "__DASK_PARENT_PID"},
+        "ignored": [n for n in signal.valid_signals() if signal.getsignal(n) == signal.SIG_IGN],
+        "numba knows": len(cpu_target.target_context._registries),
+        "loaded": "chimera_hpc.run.work" in sys.modules,
+    }
+
+before = dict(os.environ)
+with fork_server(sys.argv[1] == "forked"):
+    same = dict(os.environ) == before
+    with local_cluster(1) as client:
+        (found,) = client.run(look).values()
+print(json.dumps(found | {"driver as before": same}))
+"""
+linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks into /proc")
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Path:
+    """A job that takes a while."""
+    file = tmp_path / "job.toml"
+    file.write_text(JOB)
+    return file
+
+
+def looked_at(how: str) -> dict[str, Any]:
+    """Return what a worker sees that was forked or spawned."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK, how], capture_output=True, text=True, check=True, timeout=120
+    )
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+@linux
+def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() -> None:
+    forked, spawned = looked_at("forked"), looked_at("spawned")
+    assert (forked["server"], spawned["server"]) == (True, False)
+    assert forked["environment"] == spawned["environment"]
+    assert fork_server.ONE_THREAD.items() <= forked["environment"].items()
+    assert forked["threads of the server"] == 1
+    assert forked["loaded"]
+    assert forked["numba knows"] > 0
+    assert signal.SIGINT in forked["ignored"]
+    assert forked["ignored"] == spawned["ignored"]
+    assert forked["driver as before"]
+
+
+def test_who_imports_it_otherwise_keeps_his_signals() -> None:
+    code = (
+        "import signal\n"
+        "before = [signal.getsignal(n) for n in signal.valid_signals()]\n"
+        "import chimera_hpc.run.forked\n"
+        "assert [signal.getsignal(n) for n in signal.valid_signals()] == before\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_environment_is_changed_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CHIMERA_THERE", "before")
+    monkeypatch.delenv("CHIMERA_NEW", raising=False)
+    before = dict(os.environ)
+    with fork_server.environment({"CHIMERA_THERE": "meanwhile", "CHIMERA_NEW": "1"}):
+        assert (os.environ["CHIMERA_THERE"], os.environ["CHIMERA_NEW"]) == ("meanwhile", "1")
+    assert dict(os.environ) == before
+
+
+def test_without_the_method_workers_are_spawned(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+    monkeypatch.setattr(fork_server, "_start", started)
+    with fork_server.fork_server():
+        assert not fork_server.is_running()
+
+
+def test_fork_server_of_the_program_itself_is_left_alone() -> None:
+    code = (
+        "import multiprocessing.forkserver as theirs\n"
+        "from chimera_hpc.run import fork_server as ours\n"
+        "theirs.set_forkserver_preload(['json'])\n"
+        "theirs.ensure_running()\n"
+        "pid = theirs._forkserver._forkserver_pid\n"
+        "with ours.fork_server():\n"
+        "    assert not ours.is_running()\n"
+        "assert (theirs._forkserver._forkserver_pid, theirs._forkserver._preload_modules)"
+        " == (pid, ['json'])\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def started() -> None:
+    raise AssertionError("a fork server was started")
+
+
+def test_commands_that_need_no_workers_start_none(
+    job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fork_server, "_start", started)
+    # Other tests of this process may have a fork server of their own.
+    monkeypatch.setattr(fork_server, "_is_possible", lambda: True)
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    assert main(["plan", str(job)]) == 0
+    short = ["--set", "integrator.t_end=60", "--set", "features.start=30", "--no-figures"]
+    words = ["run", str(job), "--out", str(tmp_path / "out"), *short]
+    assert main([*words, "--cluster", "serial"]) == 0
+    assert main(["status", str(tmp_path / "out")]) == 0
+    assert main(["retry", str(tmp_path / "out"), "--cluster", "serial", "--no-figures"]) == 0
+    with pytest.raises(AssertionError, match="was started"):
+        main(words)
+
+
+@pytest.mark.parametrize(
+    ("typed", "needed"),
+    [
+        ("run job.toml", True),
+        ("retry out --status time_out", True),
+        ("run job.toml --cluster local", True),
+        ("run job.toml --cluster=serial", False),
+        ("run job.toml --clus serial --out x", False),
+        ("run job.toml --cluster slurm", False),
+        ("run job.toml --cluster serial --cluster local", True),
+        ("run job.toml --cluster", False),
+        ("run -h", False),
+        ("status out", False),
+        ("", False),
+    ],
+)
+def test_command_line_says_early_whether_workers_are_needed(typed: str, needed: bool) -> None:
+    assert needs_workers(typed.split()) is needed
+
+
+def start(job: Path, *options: str) -> subprocess.Popen[str]:
+    """Start a run with two workers in a process group of its own."""
+    command = [sys.executable, "-m", "chimera_hpc.sweep", "run", str(job), "--workers", "2"]
+    return subprocess.Popen(
+        [*command, "--out", str(job.parent / "out"), "--no-figures", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
+    until = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    return found
+
+
+def servers(driver: int) -> list[psutil.Process]:
+    children = psutil.Process(driver).children()
+    return [child for child in children if "forkserver" in " ".join(child.cmdline())]
+
+
+@pytest.fixture
+def running(job: Path) -> Iterator[subprocess.Popen[str]]:
+    """A run that has just started its fork server."""
+    with start(job) as driver:
+        wait_for(lambda: servers(driver.pid))
+        yield driver
+        driver.kill()
+
+
+@linux
+def test_server_that_still_imports_ends_with_a_killed_driver(
+    running: subprocess.Popen[str],
+) -> None:
+    family = psutil.Process(running.pid).children(recursive=True)
+    running.kill()
+    assert psutil.wait_procs(family, timeout=30)[1] == []
+
+
+@linux
+def test_server_and_workers_end_with_a_killed_driver(running: subprocess.Popen[str]) -> None:
+    (server,) = servers(running.pid)
+    wait_for(lambda: len(server.children()) == 2)
+    family = psutil.Process(running.pid).children(recursive=True)
+    assert len(family) >= 3
+    running.kill()
+    assert psutil.wait_procs(family, timeout=30)[1] == []
+
+
+@linux
+def test_server_outlives_what_a_batch_system_sends_to_all_processes(
+    running: subprocess.Popen[str],
+) -> None:
+    (server,) = servers(running.pid)
+    workers = wait_for(lambda: len(server.children()) == 2 and server.children())
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1):
+        server.send_signal(number)
+    time.sleep(0.5)
+    assert server.children() == workers
+    running.send_signal(signal.SIGTERM)
+    output, _ = running.communicate(timeout=60)
+    assert running.returncode == 75, output
+    assert psutil.wait_procs([server, *workers], timeout=30)[1] == []
+
+
+@linux
+@pytest.mark.parametrize("late", [False, True])
+def test_ctrl_c_while_it_imports_or_works_says_nothing_else(
+    late: bool, running: subprocess.Popen[str]
+) -> None:
+    if late:
+        (server,) = servers(running.pid)
+        wait_for(lambda: len(server.children()) == 2)
+    family = psutil.Process(running.pid).children(recursive=True)
+    os.killpg(running.pid, signal.SIGINT)
+    output, _ = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert "to go on:" in output if late else not output
+    assert "Traceback" not in output
+    assert psutil.wait_procs(family, timeout=30)[1] == []
+
+
+@linux
+def test_run_with_nothing_to_do_does_not_wait_for_it(job: Path) -> None:
+    short = ("--set", "integrator.t_end=60", "--set", "features.start=30")
+    for _ in range(2):
+        with start(job, *short) as driver:
+            (server,) = wait_for(lambda: servers(driver.pid))
+            output, _ = driver.communicate(timeout=120)
+            assert driver.returncode == 0, output
+            assert not server.is_running()
+    assert "nothing to compute" in output

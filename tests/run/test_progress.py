@@ -1,0 +1,80 @@
+"""Telling how a run goes: plain lines, the log, and what may go wrong with them."""
+
+from __future__ import annotations
+
+import errno
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+from chimera_hpc.run import progress
+from chimera_hpc.run.progress import Reporter
+
+
+class Full(io.StringIO):
+    """A stream on a full disk."""
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_plain_lines_come_at_intervals_and_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    stream = io.StringIO()
+    with Reporter(100, stream=stream) as reporter:
+        reporter.count(20, 1)
+        for _ in range(8):
+            now += 4.0
+            reporter.add(9, 1, seconds=4.0)
+    lines = stream.getvalue().splitlines()
+    # Every 10 s: after 12, 24 and, at the end, 32 s.
+    assert lines == [
+        "50 of 100 points, 4 failed, 2.5 points/s, 20 s to go",
+        "80 of 100 points, 7 failed, 2.5 points/s, 8 s to go",
+        "100 of 100 points, 9 failed, 2.5 points/s, 0 s to go",
+    ]
+
+
+def test_no_time_to_go_is_told_before_any_point_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    stream = io.StringIO()
+    with Reporter(8, stream=stream) as reporter:
+        for n_done in (0, 4):
+            now += 20.0
+            reporter.add(n_done, 0)
+    assert stream.getvalue().splitlines() == ["4 of 8 points, 0.2 points/s, 20 s to go"]
+
+
+def test_log_gets_every_line_with_its_time(tmp_path: Path) -> None:
+    with Reporter(10, tmp_path / "run.log", io.StringIO()) as reporter:
+        reporter.say("to be seen")
+        reporter.note("for later")
+    lines = (tmp_path / "run.log").read_text().splitlines()
+    assert len(lines) == 2
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00 to be seen", lines[0])
+    assert lines[1].endswith(" for later")
+
+
+def test_full_disk_is_no_reason_to_stop() -> None:
+    with Reporter(10, Path("/dev/full"), Full()) as reporter:
+        reporter.say("nobody hears this")
+        reporter.add(10, 0)
+    assert reporter.done == 10
+
+
+def test_terminal_gets_a_bar_with_count_and_rate() -> None:
+    stream = Terminal()
+    with Reporter(8, stream=stream) as reporter:
+        reporter.count(2, 0)
+        reporter.add(6, 0, seconds=2.0)
+    assert "8/8" in stream.getvalue()
+    assert "3.0/s" in stream.getvalue()
