@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from chimera_hpc.run.simulate import simulate
     from chimera_hpc.store.labelled import open_sweep as open
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Limit",
