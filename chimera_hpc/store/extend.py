@@ -68,7 +68,7 @@ def extend(path: Path, sweeps: Sequence[Sweep], sweep: Sweep, block_size: int) -
             node["shape"][0] = len(new)
             write_atomically(file, json.dumps(node, indent=1).encode())
     write_coordinates(path, sweep, stored)
-    for name in stored:
+    for name in (*stored, "time"):
         sync_tree(path / name)
     write_root(path, root_attributes([*sweeps, sweep], len(new), block_size))
 
