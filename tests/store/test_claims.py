@@ -17,7 +17,13 @@ from store_tools import claim_and_tell, process_context
 from chimera_hpc.base import files, processes
 from chimera_hpc.base.processes import is_gone, process_mark
 from chimera_hpc.store import claims
-from chimera_hpc.store.claims import Claim, claim_block, forget_points, live_claims
+from chimera_hpc.store.claims import (
+    Claim,
+    claim_block,
+    forget_points,
+    live_claims,
+    remove_stale,
+)
 
 
 def claim_file(store: Path, block: int | str, attempt: int = 1) -> Path:
@@ -210,6 +216,50 @@ def test_a_wrong_clock_does_not_expire_others_claims(tmp_path: Path, monkeypatch
     make_foreign(claim)
     monkeypatch.setattr(time, "time", lambda: 1e12)
     assert claim_block(tmp_path, 3, 8) is None
+
+
+@pytest.mark.parametrize("now", [0.0, 1e12])
+def test_a_wrong_clock_does_not_change_which_claims_are_live(
+    tmp_path: Path, monkeypatch: Any, now: float
+) -> None:
+    live, expired = taken(tmp_path, 3), taken(tmp_path, 4)
+    make_foreign(live)
+    make_foreign(expired)
+    expire(expired)
+    monkeypatch.setattr(time, "time", lambda: now)
+    assert live_claims(tmp_path).keys() == {3}
+    assert remove_stale(tmp_path, [3, 4]) == 1
+    assert os.listdir(tmp_path / "claims") == ["3.1.json"]
+
+
+def test_stale_claims_of_unfinished_blocks_stay(tmp_path: Path) -> None:
+    for block in (3, 4):
+        expire(taken(tmp_path, block))
+    assert remove_stale(tmp_path, [4]) == 1
+    assert os.listdir(tmp_path / "claims") == ["3.1.json"]
+
+
+@pytest.mark.parametrize("end", ["release", "remove_stale"])
+def test_the_highest_attempt_is_removed_last(tmp_path: Path, monkeypatch: Any, end: str) -> None:
+    for attempt in range(1, 12):
+        claim = taken(tmp_path)
+        assert claim.attempts == attempt
+        if attempt < 11:
+            claim.hand_back()
+    unlink, removed = Path.unlink, []
+
+    def note(path: Path, missing_ok: bool = False) -> None:
+        if path.name.startswith("3."):
+            removed.append(path.name)
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", note)
+    if end == "release":
+        claim.release()
+    else:
+        claim.hand_back()
+        remove_stale(tmp_path, [3])
+    assert removed == [f"3.{attempt}.json" for attempt in range(1, 12)]
 
 
 def test_stale_listing_gives_no_second_owner(tmp_path: Path, monkeypatch: Any) -> None:

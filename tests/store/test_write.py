@@ -19,6 +19,7 @@ from store_tools import (
     work,
 )
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import BlockFiles
 from chimera_hpc.store.claims import Claim, ClaimLost, claim_block
@@ -195,6 +196,21 @@ def test_results_of_some_points_go_to_their_rows(store: Store) -> None:
     np.testing.assert_array_equal(store.features()[4:8], results(store, range(4, 8)).features)
 
 
+@pytest.mark.parametrize("dtype", ["int16", "float32"])
+def test_rows_that_did_not_run_are_missing_and_not_zero(tmp_path: Path, dtype: str) -> None:
+    store = make_store(tmp_path, f"keep.dtype={dtype}")
+    store.write_block(1, results(store, [5, 7]), 1, 1, rows=[1, 3])
+    for point in (4, 6):
+        with pytest.raises(BadInput, match=f"point {point} "):
+            store.series(point)
+    assert np.isnan(store.features()[[4, 6]]).all()
+    assert all(np.isnan(column[[4, 6]]).all() for column in store.scalars().values())
+    with xr.open_zarr(store.path, chunks=None) as data:
+        for values in (data.u.values, data.features.values, data.scalars.values):
+            assert np.isnan(values[[4, 6]]).all()
+            assert np.isfinite(values[[5, 7]]).all()
+
+
 def test_attempts_add_up_over_retries(store: Store) -> None:
     store.write_block(0, block_results(store, 0, Status.TIME_OUT), 1, attempts=2)
     store.write_block(0, results(store, [1]), 5, attempts=1, rows=[1])
@@ -294,13 +310,15 @@ def test_a_claim_of_the_right_owner_lets_him_write(store: Store) -> None:
     claim.release()
 
 
-def test_many_blocks_a_second_without_series(tmp_path: Path) -> None:
-    store = make_store(
-        tmp_path, "seeds=5000", "run.block=300", "keep.series=none", "fixed.n_nodes=50"
-    )
-    made = results(store, np.arange(300))
-    began = time.process_time()
-    for block in range(20):
-        store.write_block(block, made, 1, 1)
-    # Processor time only: what the disk takes is not ours, and this machine may be shared.
-    assert 20 / (time.process_time() - began) > 50
+def test_a_block_without_series_is_three_files_and_no_work_of_zarr(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
+    store = make_store(tmp_path, "keep.series=none")
+    made = block_results(store, 0)
+    flushed = []
+    fsync = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda file: flushed.append(file) or fsync(file))
+    monkeypatch.setattr("chimera_hpc.store.blocks.create_array", None)
+    store.write_block(0, made, 1, 1)
+    # Each file and the folder of each.
+    assert len(flushed) == 6
