@@ -66,3 +66,20 @@ def test_atlas_can_keep_a_finer_cut() -> None:
 def test_atlas_without_training_points_classifies_nothing() -> None:
     atlas = Atlas.of(classify(np.empty((0, 3)), np.empty(0)))
     assert atlas.classify([[0.1, 0.1, 0.1]]).name == [UNCLASSIFIED]
+
+
+def test_a_tie_gives_one_of_the_nearest_runs_and_the_same_one_each_time() -> None:
+    """On a lattice most triplets are equally far from several runs, each of its own class."""
+    rng = np.random.default_rng(7)
+    points, asked = rng.integers(0, 4, (60, 3)) / 4.0, rng.integers(0, 8, (40, 3)) / 8.0
+    unit = np.array([[0.0] * 3, [1.0] * 3])
+    atlas = Atlas(unit, points, np.arange(60), tuple(map(str, range(60))))
+    judged = atlas.classify(asked)
+    distances = np.linalg.norm(asked[:, None] - points[None], axis=2)
+    nearest = np.isclose(distances, distances.min(axis=1, keepdims=True), rtol=0, atol=1e-12)
+    assert (nearest.sum(axis=1) > 1).sum() > 10
+    assert nearest[np.arange(40), judged.label].all()
+    assert judged.distance == pytest.approx(distances.min(axis=1), abs=1e-12)
+    stored, attributes = atlas.variables()
+    back = Atlas.from_arrays({name: values for name, (_, values) in stored.items()}, attributes)
+    assert [int(back.classify(one).label[0]) for one in asked] == judged.label.tolist()

@@ -194,3 +194,15 @@ def test_last_step_ends_at_the_end(t_end):
     assert pool.lane[K.TIME, 0] == t_end
     assert pool.count[K.STATE, 0] == Status.DONE
     assert pool.count[K.NEXT_SAMPLE, 0] == 8
+
+
+@pytest.mark.parametrize("lanes", [1, LANES])
+def test_times_of_all_trajectories_add_up_to_no_more_than_the_wall_time(lanes):
+    """Trajectories follow one another in a lane, and each begins at zero."""
+    control = Control(200.0, 0.0, 1.0, rtol=1e-8)
+    began = time.perf_counter()
+    runs = run_all([DECAY] * 40, [np.array([1.0, 1.0])] * 40, control, lanes=lanes)
+    wall = time.perf_counter() - began
+    spent = [run.outcome.elapsed for run in runs]
+    assert min(spent) > 0.0
+    assert sum(spent) <= wall

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from threading import Thread
+from concurrent.futures import ThreadPoolExecutor
+from itertools import combinations
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -41,19 +43,30 @@ def test_room_is_the_same_memory_as_before_where_that_is_enough(sizes):
         larger[-1] = 1.0
 
 
-def test_room_that_is_lent_is_lent_to_nobody_else():
-    found = []
+def test_room_that_is_lent_is_not_lent_again_within():
+    with lent(100) as mine, lent(100) as other:
+        assert not np.shares_memory(mine, other)
+
+
+def test_each_thread_has_room_of_its_own():
+    """A thread that has given its room back keeps it: no other one may be working there."""
+    with lent(100) as mine:
+        pass
+    both_have_one, found = Barrier(2, timeout=30), []
 
     def ask():
         with lent(100) as room:
+            both_have_one.wait()
             found.append(room)
+        with lent(100) as again:
+            assert again.ctypes.data == room.ctypes.data
+            both_have_one.wait()
 
-    with lent(100) as mine:
-        ask()
-        thread = Thread(target=ask)
-        thread.start()
-        thread.join()
-        assert not any(np.shares_memory(mine, room) for room in found)
+    with ThreadPoolExecutor(2) as pool:
+        for asked in [pool.submit(ask) for _ in range(2)]:
+            asked.result()
+    for one, other in combinations([mine, *found], 2):
+        assert not np.shares_memory(one, other)
 
 
 def test_room_comes_back_from_work_that_failed():

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job import Points, Sweep, block_size, blocks
+from chimera_hpc.job.axes import Between, Values
+from chimera_hpc.job.points import expand
 
 
 def sweep(grid, fixed=None, **tables):
@@ -210,3 +212,29 @@ def test_a_million_points_are_columns_of_the_right_length():
     assert len(points) == 319 * 20 * 160
     assert len(cells["P"]) == 319 * 20
     assert np.array_equal(cell_id, np.repeat(np.arange(319 * 20), 160))
+
+
+def test_ranges_whose_points_exceed_an_int64_are_refused():
+    axes = {"Q": Values(range(100)), "x": Between(-(10**17), "Q")}
+    with pytest.raises(BadInput, match=r"1e\+19 points or more"):
+        expand(axes)
+    with pytest.raises(BadInput, match="points or more"):
+        expand({"x": Values(range(10**7)), "y": Values(range(10**17))})
+    with pytest.raises(BadInput, match="points or more, at most 1e"):
+        sweep({"P": "3:24", "Q": 0, "epsilon": [0.1, 0.2], "seeds": 10**7}).points()
+
+
+def test_cells_of_many_columns_are_exact_where_the_product_of_their_values_exceeds_an_int64():
+    rng = np.random.default_rng(14)
+    rows = rng.integers(0, 1000, (2000, 10))
+    # Rows that differ in one column only, and rows that are there twice.
+    rows[1000:1500] = rows[:500]
+    rows[1500:] = rows[:500]
+    rows[1500:, 9] += 1
+    columns = {f"x{i}": np.ascontiguousarray(rows[:, i]) for i in range(10)}
+    points = Points({**columns, "seed": np.arange(2000)}, (*columns, "seed"))
+    cell_id, cells = points.cells()
+    numbers: dict[tuple[int, ...], int] = {}
+    expected = [numbers.setdefault(tuple(row), len(numbers)) for row in rows.tolist()]
+    assert cell_id.tolist() == expected
+    assert list(zip(*(cells[name].tolist() for name in columns), strict=True)) == [*numbers]

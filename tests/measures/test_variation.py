@@ -100,3 +100,10 @@ def test_chain_has_one_difference_less_and_is_the_mean_over_its_pairs():
     assert found == pytest.approx((0.5, 1.5, 1.5))
     with pytest.raises(BadInput, match="a chain has at least two nodes"):
         total_variation_arrays([0.0], [1.0], [1.0], ring=False)
+
+
+@pytest.mark.parametrize("turn", [np.pi, -np.pi])
+def test_phases_exactly_half_a_turn_apart_vary_most_and_a_whole_turn_apart_not_at_all(turn):
+    assert v_phase([0.0, turn, 0.0, turn]) == 1.0
+    assert v_phase([np.pi, -np.pi, np.pi, -np.pi]) == 0.0
+    assert v_phase([turn] * 3) == 0.0

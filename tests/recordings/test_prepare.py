@@ -121,3 +121,19 @@ def test_nothing_whole_is_refused():
     u[0, 1] = 1.0
     with pytest.raises(BadInput, match="no stretch without gaps of more than 0 samples"):
         prepare(Recording(np.arange(9.0), u), None, bridge=0)
+
+
+@pytest.mark.parametrize("factor", [0.001, 1.0, 50.0])
+def test_lowpass_is_in_the_unit_of_the_recording_whatever_the_factors(factor: float):
+    t = 0.001 * np.arange(4000)
+    slow, fast = np.sin(2 * np.pi * 2.0 * t), np.sin(2 * np.pi * 100.0 * t)
+    made = prepare(Recording(t, column(*(slow + fast))), None, scale=(factor, 3.0), lowpass=20.0)
+    assert made.t == pytest.approx(factor * t)
+    assert made.u[500:-500, 0] == pytest.approx(3.0 * slow[500:-500], abs=0.02)
+
+
+def test_lowpass_is_refused_by_the_recordings_own_sampling_frequency():
+    t, u = 0.001 * np.arange(4000), np.ones((4000, 1))
+    prepare(Recording(t, u), None, scale=(0.01, 1.0), lowpass=499.0)
+    with pytest.raises(BadInput, match="--lowpass: "):
+        prepare(Recording(t, u), None, scale=(0.01, 1.0), lowpass=501.0)

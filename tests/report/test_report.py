@@ -317,3 +317,13 @@ def test_reduce_writes_the_report_unless_figures_are_not_wanted(tmp_path, filled
     assert not (tmp_path / "report.html").exists()
     assert main(["reduce", str(tmp_path)]) == 0
     assert f"report   {tmp_path / 'report.html'} (" in capsys.readouterr().out
+
+
+def test_a_class_name_cannot_break_out_of_the_pages_data(tmp_path, filled):
+    name = "</script><script>alert(1)</script><!--"
+    filled(tmp_path, FAST, "title='</title><b>'", f"reduction.names=['{name}','b','c']")
+    page = page_of(tmp_path)
+    looks = data_of(page)["cuts"]["3"]["looks"]
+    assert sorted(look["name"] for look in looks)[:1] == [name]
+    assert "alert(1)<" not in page
+    assert "</title><b>" not in page
