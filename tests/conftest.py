@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+import signal
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
-
-if TYPE_CHECKING:
-    from distributed import LocalCluster
 
 # Set before numpy is imported: one thread a process, as in the workers, and no display.
 for _name in ("OMP", "MKL", "OPENBLAS", "NUMBA"):
     os.environ[f"{_name}_NUM_THREADS"] = "1"
 os.environ["MPLBACKEND"] = "Agg"
+
+# A shell's background, as in `nohup scripts/test &`, has SIGINT ignored, and every process that a
+# test starts would inherit that.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # A shared machine makes deadlines lie; in CI the same examples are tried every time.
 settings.register_profile("local", deadline=None)
@@ -72,19 +74,3 @@ def _skip(items: list[pytest.Item], marker: str, reason: str) -> None:
 def _missing(programs: Sequence[str]) -> list[str]:
     path = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/sbin"))
     return [name for name in programs if shutil.which(name, path=path) is None]
-
-
-@pytest.fixture(scope="module")
-def local_cluster() -> Iterator[LocalCluster]:
-    """Two worker processes with one thread each, on loopback, without a dashboard."""
-    from distributed import LocalCluster
-
-    with LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=True,
-        host="127.0.0.1",
-        dashboard_address=None,
-        memory_limit=0,
-    ) as cluster:
-        yield cluster

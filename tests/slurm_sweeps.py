@@ -13,11 +13,10 @@ from chimera_hpc.store.ledger import read_ledger
 
 JOB = """
 name = "small"
-model = "topological_fhn"
+model = "{model}"
 [grid]
 P = "2:5"
-Q = "P"
-seeds = 16
+{more}seeds = 16
 [fixed]
 n_nodes = 12
 [integrator]
@@ -45,10 +44,13 @@ LONG = 4000.0
 """Time of runs that let a sweep last for some three seconds on two cores."""
 
 
-def write_job(folder: Path, t_end: float = 100.0, block: int = 4) -> Path:
+def write_job(
+    folder: Path, t_end: float = 100.0, block: int = 4, model: str = "topological_fhn"
+) -> Path:
     """Write a job of 64 points."""
     path = folder / "small.toml"
-    path.write_text(JOB.format(t_end=t_end, block=block))
+    more = 'Q = "P"\n' if model == "topological_fhn" else ""
+    path.write_text(JOB.format(t_end=t_end, block=block, model=model, more=more))
     return path
 
 

@@ -1,9 +1,10 @@
-"""The options and markers of conftest.py, seen from a pytest run of their own, and its cluster."""
+"""The options and markers of conftest.py, seen from a pytest run of their own."""
 
 from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -32,6 +33,23 @@ SLOW = "@pytest.mark.slow\ndef test_it():\n    pass\n"
 SLURM = "@pytest.mark.slurm\ndef test_it():\n    pass\n"
 
 
+HEARD = """
+import os, signal, subprocess, sys
+def test_it():
+    child = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
+    done = subprocess.run([sys.executable, "-c", child], stderr=subprocess.DEVNULL)
+    assert done.returncode == -signal.SIGINT
+"""
+
+
+def test_ctrl_c_reaches_what_tests_start_though_it_is_ignored_here(tmp_path: Path) -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert outcome(tmp_path, HEARD).startswith("1 passed")
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_slow_tests_run_only_when_asked_for(tmp_path):
     assert outcome(tmp_path, SLOW).startswith("1 skipped")
     assert outcome(tmp_path, SLOW, "--run-slow").startswith("1 passed")
@@ -54,15 +72,3 @@ def test_unknown_markers_and_warnings_are_errors(tmp_path):
     warning = "import warnings\ndef test_it():\n    warnings.warn('careful', stacklevel=1)\n"
     assert outcome(tmp_path, unknown).startswith("1 error")
     assert outcome(tmp_path, warning).startswith("1 failed")
-
-
-def test_local_cluster_has_two_workers_with_one_thread_each(local_cluster):
-    from distributed import Client
-
-    with Client(local_cluster) as client:
-        workers = client.scheduler_info(n_workers=-1)["workers"]
-        assert [worker["nthreads"] for worker in workers.values()] == [1, 1]
-        assert all("127.0.0.1" in address for address in workers)
-        assert client.submit(os.getpid).result() != os.getpid()
-        environment = client.run(lambda: os.environ.get("OMP_NUM_THREADS"))
-    assert set(environment.values()) == {"1"}

@@ -264,16 +264,14 @@ def test_block_that_cannot_be_done_is_put_aside_and_told_of(
 
 
 @pytest.fixture
-def heard() -> Iterator[None]:
-    """Signals as in a terminal: `nohup`, or a shell's background, has had some of them ignored."""
-    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
-    before = {number: signal.signal(number, handler) for number, handler in usual.items()}
+def _hang_up_is_heard() -> Iterator[None]:
+    """SIGHUP as in a terminal: `nohup` has it ignored."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    signal.signal(signal.SIGHUP, before)
 
 
-@pytest.mark.usefixtures("heard")
+@pytest.mark.usefixtures("_hang_up_is_heard")
 @pytest.mark.parametrize(
     ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 75), (signal.SIGHUP, 75)]
 )
@@ -302,7 +300,6 @@ def test_signal_stops_in_good_order(
     assert sweep(*words)[0] == 0
 
 
-@pytest.mark.usefixtures("heard")
 def test_second_interrupt_breaks_off_at_once(
     job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
@@ -15,13 +16,10 @@ from slurm_sweeps import LONG, command, digests, logs, n_done, rows_done, sweep,
 
 from chimera_hpc.run.slurm import tls
 from chimera_hpc.store.claims import live_claims
-from chimera_hpc.store.ledger import read_ledger
 
 pytestmark = pytest.mark.slurm
 
 WORKERS = 2
-START_SECONDS = 3
-"""What a job needs on an idle machine before its first block."""
 
 
 @contextmanager
@@ -143,19 +141,29 @@ def test_an_array_element_that_failed_is_submitted_again(
     assert_whole(out, long_serial, before)
 
 
-def too_short(reference: Path) -> tuple[str, ...]:
-    """Return options that leave a job some 0.6 of the time that all points took one process."""
-    needed = read_ledger(reference / "store.zarr")["elapsed_us"].sum() / 1e6
-    left = min(START_SECONDS + 0.6 * needed, 55)
-    return ("--array", "1", "--time", "1", "--drain", f"{60 - left:.0f}")
+POINT_SECONDS, JOB_SECONDS = 0.25, 15
+"""A job ends before the 64 points can be done, however fast the machine is."""
+NEAR = ("--time", "1", "--drain", f"{60 - JOB_SECONDS}")
+
+
+@pytest.fixture
+def unhurried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
+    """Return a job whose points take their time, and its folder when one process did it at once."""
+    monkeypatch.syspath_prepend(tmp_path)
+    shutil.copy(Path(__file__).parents[2] / "faults" / "trouble.py", tmp_path)
+    job = write_job(tmp_path, model="trouble:MODEL")
+    alone = sweep(*("run", job, "--out", tmp_path / "alone", "--cluster", "serial", "--no-figures"))
+    assert alone.returncode == 0, alone.stderr
+    monkeypatch.setenv("TROUBLE_SECONDS", str(POINT_SECONDS))
+    return job, tmp_path / "alone"
 
 
 def test_a_job_near_its_limit_says_that_there_is_more_to_do_and_the_next_one_ends_the_sweep(
-    slurm: Slurm, long_serial: Path, tmp_path: Path
+    slurm: Slurm, unhurried: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    job, out = write_job(tmp_path, LONG), tmp_path / "out"
+    (job, alone), out = unhurried, tmp_path / "out"
     words = ("slurm", job, "--out", out, "--mode", "array", "--no-reduce", "--submit")
-    number = sweep(*words, *too_short(long_serial)).stdout.split()[2]
+    number = sweep(*words, "--array", "1", *NEAR).stdout.split()[2]
     slurm.wait()
     before = rows_done(out)
     assert len(before) < 64
@@ -164,17 +172,17 @@ def test_a_job_near_its_limit_says_that_there_is_more_to_do_and_the_next_one_end
     number = sweep(*words, "--array", "2").stdout.split()[2]
     slurm.wait()
     assert [slurm.exit_code(f"{number}_{i}") for i in (0, 1)] == [0, 0]
-    assert_whole(out, long_serial, before)
+    assert_whole(out, alone, before)
 
 
 def test_a_job_near_its_limit_goes_on_as_the_same_job_until_the_sweep_is_reduced(
-    slurm: Slurm, long_serial: Path, tmp_path: Path
+    slurm: Slurm, unhurried: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    job, out = write_job(tmp_path, LONG), tmp_path / "out"
+    (job, alone), out = unhurried, tmp_path / "out"
     words = ("slurm", job, "--out", out, "--mode", "array", "--resubmit", "9", "--submit")
-    number = sweep(*words, *too_short(long_serial)).stdout.split()[2]
+    number = sweep(*words, "--array", "1", *NEAR).stdout.split()[2]
     slurm.wait()
     assert "goes on later: 1 of 9" in logs(out)
     assert slurm.told(number, "Restarts") != "0"
-    assert_whole(out, long_serial, {})
+    assert_whole(out, alone, {})
     assert (out / "results.json").is_file()
