@@ -27,6 +27,52 @@ METHODS = {
 }
 """Runge-Kutta pairs: `integrate.tableau.Tableau`."""
 
+ANALYSES = {
+    "networks": "chimera_hpc.reduction.analyses.ring:networks",
+    "stability": "chimera_hpc.reduction.analyses.ring:stability",
+    "basin": "chimera_hpc.reduction.analyses.ring:basin",
+    "oscillation": "chimera_hpc.reduction.analyses.ring:oscillation",
+    "variations": "chimera_hpc.reduction.analyses.method:variations",
+    "atlas": "chimera_hpc.reduction.analyses.judged:atlas",
+    "robustness": "chimera_hpc.reduction.analyses.judged:robustness",
+    "incoherence": "chimera_hpc.reduction.analyses.incoherence:incoherence",
+    "sigma-l": "chimera_hpc.reduction.analyses.incoherence:sigma_l",
+    "agreement": "chimera_hpc.reduction.analyses.incoherence:agreement",
+    "synthetic": "chimera_hpc.reduction.analyses.method:synthetic",
+    "spectrum": "chimera_hpc.reduction.analyses.method:spectrum",
+}
+"""Functions of an `reduction.analyses.AnalysisInput` that return a dict for results.json."""
+
+FIGURES = {
+    "space_time": "chimera_hpc.plot.spacetime:space_time_figure",
+    "indicators": "chimera_hpc.plot.indicators:indicators_figure",
+    "whole_run": "chimera_hpc.plot.spacetime:whole_run_figure",
+    "networks": "chimera_hpc.plot.network:networks_figure",
+    "stability": "chimera_hpc.plot.stability:stability_figure",
+    "basin": "chimera_hpc.plot.basin:basin_figure",
+    "atlas": "chimera_hpc.plot.atlas:atlas_figure",
+    "robustness": "chimera_hpc.plot.robustness:robustness_figure",
+    "incoherence": "chimera_hpc.plot.incoherence:incoherence_figure",
+    "incoherence_delta": "chimera_hpc.plot.incoherence:sensitivity_figure",
+    "sigma_l": "chimera_hpc.plot.density:sigma_l_figure",
+    "agreement": "chimera_hpc.plot.agreement:agreement_figure",
+    "verdicts": "chimera_hpc.plot.agreement:verdicts_figure",
+    "reconstruction": "chimera_hpc.plot.synthetic:reconstruction_figure",
+    "synthetic_signal": "chimera_hpc.plot.synthetic:signal_figure",
+    "spectrum": "chimera_hpc.plot.spectrum:spectrum_figure",
+}
+"""Functions of a `plot.figure_input.FigureInput` that return a matplotlib Figure, or None where
+the sweep has nothing for it to show."""
+
+CUT_FIGURES = {
+    "dendrogram": "chimera_hpc.plot.dendrogram:dendrogram_figure",
+    "projections": "chimera_hpc.plot.projections:projections_figure",
+    "modal_classes": "chimera_hpc.plot.modes:modal_classes_figure",
+    "classification": "chimera_hpc.plot.classification:classification_figure",
+}
+"""The same with the number of clusters as second argument; it may follow the name, as in
+dendrogram_3."""
+
 
 @cache
 def load(place: str) -> Any:

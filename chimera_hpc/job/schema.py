@@ -11,7 +11,7 @@ from typing import Any
 
 from chimera_hpc.job.models import built_in
 from chimera_hpc.job.parameters import DELTA
-from chimera_hpc.job.selection import ANALYSES, CURVE_FIGURES, CUT_FIGURES, FIGURES
+from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES
 from chimera_hpc.job.spec import Sweep
 from chimera_hpc.job.tables import TABLES, Reduction
 from chimera_hpc.models.parameters import ModelParameters
@@ -79,7 +79,7 @@ def _only_for(name: str, model: ModelParameters) -> dict[str, Any]:
 
 def _name_figures_and_analyses(keys: dict[str, Any]) -> None:
     cuts = "|".join(CUT_FIGURES)
-    figure = {"anyOf": [{"enum": [*FIGURES, *CURVE_FIGURES]}, {"pattern": f"^({cuts})(_[0-9]+)?$"}]}
+    figure = {"anyOf": [{"enum": list(FIGURES)}, {"pattern": f"^({cuts})(_[0-9]+)?$"}]}
     for kind in keys["figures"]["anyOf"]:
         kind |= {"items": figure} if kind["type"] == "array" else {"const": "auto"}
     keys["analyses"]["items"] = {"type": "string", "enum": list(ANALYSES)}

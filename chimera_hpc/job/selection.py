@@ -3,52 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.models import built_in
 from chimera_hpc.job.parameters import DELTA, SEED
+from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES
 from chimera_hpc.models.parameters import ModelParameters, Parameter
 
-FIGURES = ("space_time", "indicators", "whole_run")
-"""Names of the figures of a sweep, drawn by `chimera_hpc.plot.catalogue`."""
-CURVE_FIGURES = (
-    "networks",
-    "stability",
-    "basin",
-    "atlas",
-    "robustness",
-    "incoherence",
-    "incoherence_delta",
-    "sigma_l",
-    "agreement",
-    "verdicts",
-    "reconstruction",
-    "synthetic_signal",
-    "spectrum",
-)
-"""Names of the figures of analyses."""
-ANALYSES = (
-    "networks",
-    "stability",
-    "basin",
-    "oscillation",
-    "variations",
-    "atlas",
-    "robustness",
-    "incoherence",
-    "sigma-l",
-    "agreement",
-    "synthetic",
-    "spectrum",
-)
-"""Names of the analyses, made by `chimera_hpc.reduction.analyses`."""
-CUT_FIGURES = ("dendrogram", "projections", "modal_classes", "classification")
-"""Names of the figures of one cut; the number of clusters may follow, as in dendrogram_3."""
-
-_PARAMETERS = {p.name: p for model in built_in().values() for p in (*model.parameters, DELTA, SEED)}
 _EXAMPLE = 'NAME=NUMBER is needed, such as "P=9 Q=9 seed=0"'
 _WORD = re.compile(r"\w+=[-+.\w]+", re.ASCII)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,30}")
@@ -89,9 +53,8 @@ def check_names(key: str, texts: Sequence[str], model: ModelParameters | None) -
     Without a model: that none of the project's own models knows; a selection may speak of another
     sweep.
     """
-    known = _PARAMETERS
-    if model is not None:
-        known = {p.name: p for p in (*model.parameters, DELTA, SEED)}
+    models = built_in().values() if model is None else [model]
+    known = {p.name: p for each in models for p in (*each.parameters, DELTA, SEED)}
     for text in texts:
         parse_selection(text, key, known)
 
@@ -123,14 +86,13 @@ def check_figures(value: Any) -> Any:
     """Pass "auto", or return a tuple of known names of figures; BadInput for others."""
     if value == "auto":
         return value
-    names, known = _texts(value), [*FIGURES, *CURVE_FIGURES, *CUT_FIGURES]
+    names, known = _texts(value), [*FIGURES, *CUT_FIGURES]
     if names is None:
         text = f'{short(value)} is neither "auto" nor a list of names; known: {", ".join(known)}'
         raise BadInput(f"reduction.figures: {text}")
     for name in names:
-        if not (name in known or split_figure_name(name)[0] in CUT_FIGURES):
-            hint = nearest(name, known)
-            raise BadInput(f"reduction.figures: {short(name)} is not a figure{hint}")
+        if split_figure_name(name)[0] not in CUT_FIGURES:
+            check_name("reduction.figures", "a figure", name, known)
     return names
 
 
@@ -140,10 +102,14 @@ def check_analyses(value: Any) -> tuple[str, ...]:
     if names is None:
         raise BadInput(f"reduction.analyses: {short(value)} is not a list of names")
     for name in names:
-        if name not in ANALYSES:
-            hint = nearest(name, list(ANALYSES))
-            raise BadInput(f"reduction.analyses: {short(name)} is not an analysis{hint}")
+        check_name("reduction.analyses", "an analysis", name, ANALYSES)
     return names
+
+
+def check_name(key: str, kind: str, name: str, known: Iterable[str]) -> None:
+    """Raise BadInput, with the nearest known name, unless the name is known."""
+    if name not in known:
+        raise BadInput(f"{key}: {short(name)} is not {kind}{nearest(name, list(known))}")
 
 
 def _texts(value: Any) -> tuple[str, ...] | None:

@@ -65,3 +65,11 @@ def synthetic_signal(t: ArrayLike, n_nodes: int = 100) -> Array:
     times = np.asarray(t, dtype=np.float64)
     signal: Array = amplitude * np.cos(2.0 * np.pi * frequency * times + phase)
     return signal.T
+
+
+def profile_error(
+    true: NDArray[np.float64], found: NDArray[np.float64], periodic: bool
+) -> NDArray[np.float64]:
+    """Return true - found; for angles the smallest difference, in [-pi, pi)."""
+    difference = true - found
+    return (difference + np.pi) % (2.0 * np.pi) - np.pi if periodic else difference

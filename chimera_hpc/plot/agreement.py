@@ -1,17 +1,44 @@
-"""Several methods on the same runs: confusion matrices, and classes cell by cell."""
+"""Several methods on the same runs: confusion matrices, and the class of each cell."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
+
+_SPOKEN = {"SI": "SI", "triplets": "triplets", "sigma_1": r"$\sigma_1$"}
+
+
+def agreement_figure(data: FigureInput) -> Figure | None:
+    """Draw a confusion matrix for each pair of methods."""
+    entry = data.curves.get("agreement")
+    if entry is None:
+        return None
+    comparisons = [
+        Comparison(_SPOKEN[p["rows"]], _SPOKEN[p["columns"]], entry["classes"], p["counts"])
+        for p in entry["pairs"]
+    ]
+    return confusion_matrices(comparisons)
+
+
+def verdicts_figure(data: FigureInput) -> Figure | None:
+    """Draw the modal class of each cell by each method, and mark where they differ."""
+    entry = data.curves.get("agreement")
+    if entry is None or data.only_axis is None:
+        return None
+    label, x = data.only_axis
+    methods: Mapping[str, Sequence[str | None]] = {
+        _SPOKEN[name]: classes for name, classes in entry["modal"].items()
+    }
+    return verdicts(x, methods, label=label)
 
 
 @dataclass(frozen=True)
@@ -27,8 +54,7 @@ class Comparison:
 @style.styled
 def confusion_matrices(comparisons: Sequence[Comparison]) -> Figure:
     """Draw one matrix for each pair of methods; the title gives the share of equal verdicts."""
-    figure = style.new_figure(2.5 * len(comparisons) + 0.5, 2.7)
-    axes = list(figure.subplots(1, len(comparisons), squeeze=False)[0])
+    figure, axes = style.new_panels(len(comparisons), 2.5 * len(comparisons) + 0.5, 2.7)
     for frame, comparison in zip(axes, comparisons, strict=True):
         _draw_matrix(frame, comparison)
     style.letter(axes)
@@ -58,27 +84,18 @@ def verdicts(
 ) -> Figure:
     """Draw each method's class for each cell x (k,) in a row; a bar marks where they differ."""
     values = np.asarray(x, dtype=np.float64)
-    figure = style.new_figure(style.PAGE - 0.8, 1.1 + 0.36 * len(methods))
-    axes = figure.subplots()
+    figure, (axes,) = style.new_panels(1, style.PAGE - 0.8, 1.1 + 0.36 * len(methods))
     differ = [len(set(column)) > 1 for column in zip(*methods.values(), strict=True)]
     width = float(np.min(np.diff(np.unique(values)), initial=1.0))
     for position in values[differ]:
         axes.axvspan(position - 0.5 * width, position + 0.5 * width, color="#fbe7b2", linewidth=0.0)
     for row, classes in enumerate(methods.values()):
-        for name in style.in_order(name for name in classes if name is not None):
+        for name in style.in_order(filter(None, classes)):
             chosen = values[[other == name for other in classes]]
-            axes.scatter(
-                chosen,
-                np.full(len(chosen), row),
-                s=30.0,
-                marker=style.marker_of(name),
-                color=style.colour_of(name),
-                linewidths=0.0,
-            )
+            style.scatter_class(axes, chosen, np.full(len(chosen), row), name, 30.0)
     axes.set_yticks(range(len(methods)), list(methods))
     axes.set_ylim(len(methods) - 0.4, -0.6)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
+    style.set_ticks(axes.xaxis, values, nbins=12, integer=True)
     axes.set_xlabel(label)
-    names = [name for classes in methods.values() for name in classes if name is not None]
-    style.add_class_legend(figure, names)
+    style.add_class_legend(figure, filter(None, chain(*methods.values())))
     return figure

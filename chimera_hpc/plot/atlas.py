@@ -15,7 +15,11 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput, numbers
 from chimera_hpc.plot.projections import LABELS
+
+_PALE = 0.72
+"""Share of white in the colours of the classes."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,32 @@ class Diamonds:
     title: str
     triplets: ArrayLike
     values: ArrayLike
+
+
+def atlas_figure(data: FigureInput) -> Figure | None:
+    """Draw a diamond for each cell over the judge's classes (paper fig:hvsnmin:orient:1b, 1a).
+
+    One panel for each value of the first axis, coloured by the second; with one axis, one panel
+    that is coloured by it.
+    """
+    entry = data.curves.get("atlas")
+    if entry is None or not data.axes:
+        return None
+    *first, (parameter, colours) = data.axes[:2]
+    groups = [("", np.full(len(colours), True))]
+    if first:
+        label, values = first[0]
+        each = dict.fromkeys(values.tolist())
+        groups = [(f"{label.rstrip('$')} = {value}$", values == value) for value in each]
+    cells = next(iter(entry["judges"].values()))
+    panels = []
+    for title, group in groups:
+        chosen = [i for i in np.flatnonzero(group) if cells[i]["triplet"] is not None]
+        triplets = numbers([cells[i]["triplet"] for i in chosen]).reshape(-1, 3)
+        panels.append(Diamonds(title, triplets, colours[chosen]))
+    ground = entry["background"]
+    names = ground["names"]
+    return atlas(ground["triplets"], ground["labels"], names, panels, parameter=parameter)
 
 
 @style.styled
@@ -41,8 +71,7 @@ def atlas(
 
     The larger the value, the darker the diamond; all panels share one colour scale.
     """
-    figure = style.new_figure(style.PAGE + 0.6, 2.75)
-    axes = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
+    figure, axes = style.new_panels(len(panels), style.PAGE + 0.6, 2.75, sharex=True, sharey=True)
     every = np.concatenate([np.ravel(np.asarray(panel.values, float)) for panel in panels])
     # From a light yellow that still shows on white to nearly black.
     colours = LinearSegmentedColormap.from_list(
@@ -53,15 +82,8 @@ def atlas(
     for frame, panel in zip(axes, panels, strict=True):
         for i, name in enumerate(names):
             chosen = points[label == i]
-            frame.scatter(
-                chosen[:, x],
-                chosen[:, y],
-                s=12.0,
-                marker=style.marker_of(name),
-                color=style.lighten(style.colour_of(name), 0.72),
-                linewidths=0.0,
-                label=style.spoken(name),
-            )
+            pale = style.lighten(style.colour_of(name), _PALE)
+            style.scatter_class(frame, chosen[:, x], chosen[:, y], name, 12.0, color=pale)
         above = np.asarray(panel.triplets, float).reshape(-1, 3)
         marks = frame.scatter(
             above[:, x],
@@ -79,10 +101,10 @@ def atlas(
         frame.set_title(panel.title)
         frame.set_xlabel(LABELS[x])
     axes[0].set_ylabel(LABELS[y])
-    style.letter(list(axes))
-    figure.colorbar(marks, ax=list(axes), label=parameter, fraction=0.03, pad=0.01)
+    style.letter(axes)
+    figure.colorbar(marks, ax=axes, label=parameter, fraction=0.03, pad=0.01)
     handles = style.class_handles(names)
     for handle in handles:
-        handle.set_color(style.lighten(str(handle.get_color()), 0.72))
+        handle.set_color(style.lighten(str(handle.get_color()), _PALE))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
     return figure

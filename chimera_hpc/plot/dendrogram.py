@@ -12,8 +12,17 @@ from numpy.typing import NDArray
 from scipy.cluster import hierarchy
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
 
 _STEM = "#777777"
+
+
+def dendrogram_figure(data: FigureInput, n_clusters: int) -> Figure | None:
+    """Draw the tree with the line of a cut (paper fig:hvsnmin:orient:1 a)."""
+    tree, cut = data.classification, data.classification.cuts[n_clusters]
+    if len(tree.members) < 2:
+        return None
+    return dendrogram(tree.linkage, cut.labels[tree.members], cut.names, cut.depth)
 
 
 @style.styled
@@ -24,8 +33,8 @@ def dendrogram(
     depth: float,
 ) -> Figure:
     """Draw the tree of m leaves with its classes coloured; arguments as in `draw_dendrogram`."""
-    figure = style.new_figure(style.COLUMN + 0.6, 2.9)
-    draw_dendrogram(figure.subplots(), linkage, leaf_labels, names, depth)
+    figure, (axes,) = style.new_panels(1, style.COLUMN + 0.6, 2.9)
+    draw_dendrogram(axes, linkage, leaf_labels, names, depth)
     style.add_class_legend(figure, names)
     return figure
 

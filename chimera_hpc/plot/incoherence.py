@@ -8,11 +8,43 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
-from chimera_hpc.plot.spacetime import Panel, draw_space_time
+from chimera_hpc.plot.figure_input import FigureInput, numbers
+from chimera_hpc.plot.spacetime import Panel, draw_u, last_part
+
+_KINDS = (("SI = 0", style.RED), ("0 < SI < 1", style.BLUE), ("SI = 1", style.BLACK))
+
+
+def incoherence_figure(data: FigureInput) -> Figure | None:
+    """Draw the median SI for each threshold, and the last run to show (fig:theirmeth)."""
+    entry = data.curves.get("incoherence")
+    if entry is None or not entry["deltas"] or data.only_axis is None:
+        return None
+    label, x = data.only_axis
+    panels = [
+        Strengths(
+            rf"$\delta$ = {made['delta']:g}", x, numbers([row["median"] for row in made["rows"]])
+        )
+        for made in entry[entry["unit"]]["by_delta"]
+    ]
+    dynamics = None
+    if data.shown:
+        run = data.shown[-1]
+        dynamics = last_part(run.t, run.u, run.close_up) if run.is_fast else (run.t, run.u)
+    return incoherence(panels, label=label, dynamics=dynamics)
+
+
+def sensitivity_figure(data: FigureInput) -> Figure | None:
+    """Draw the mean SI over the parameter and the threshold."""
+    entry = data.curves.get("incoherence")
+    if entry is None or data.only_axis is None:
+        return None
+    label, x = data.only_axis
+    curve = entry["range"]["curve"]
+    strength = numbers(curve["mean"])
+    return incoherence_sensitivity(x, curve["delta"], strength, entry["deltas"], label=label)
 
 
 @dataclass(frozen=True)
@@ -24,23 +56,19 @@ class Strengths:
     strength: ArrayLike
 
 
-_KINDS = (("SI = 0", style.RED), ("0 < SI < 1", style.BLUE), ("SI = 1", style.BLACK))
-
-
 @style.styled
 def incoherence(
     panels: Sequence[Strengths], *, label: str = "$P$", dynamics: Panel | None = None
 ) -> Figure:
     """Draw SI as squares: red at 0, blue between, black at 1; and, if given, (t, u) of one run."""
     count = len(panels) + (dynamics is not None)
-    figure = style.new_figure(max(style.COLUMN + 0.6, 2.5 * count), 2.6)
-    axes = list(figure.subplots(1, count, squeeze=False)[0])
+    figure, axes = style.new_panels(count, max(style.COLUMN + 0.6, 2.5 * count), 2.6)
     for frame, panel in zip(axes, panels, strict=False):
         _draw_strength(frame, panel, label)
     axes[0].set_ylabel("strength of incoherence SI")
     if dynamics is not None:
         largest = float(np.nanmax(np.abs(np.asarray(dynamics[1]))))
-        image = draw_space_time(axes[-1], *dynamics, largest)
+        image = draw_u(axes[-1], *dynamics, largest)
         axes[-1].set_xlabel("time $t$")
         axes[-1].set_ylabel("node $i$")
         figure.colorbar(image, ax=axes[-1], label="$u_i(t)$")
@@ -55,18 +83,10 @@ def _draw_strength(axes: Axes, panel: Strengths, label: str) -> None:
     kind = np.where(strength <= 0.0, 0, np.where(strength >= 1.0, 2, 1))
     for i, (name, colour) in enumerate(_KINDS):
         chosen = kind == i
-        axes.scatter(
-            x[chosen],
-            strength[chosen],
-            s=16.0,
-            marker="s",
-            color=colour,
-            linewidths=0.0,
-            label=name,
-        )
+        look = {"marker": "s", "color": colour, "label": name}
+        style.scatter_class(axes, x[chosen], strength[chosen], name, 16.0, **look)
     axes.set_ylim(-0.06, 1.06)
-    whole = bool(np.all(x == np.rint(x)))
-    axes.xaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 3, 4, 5, 10], integer=whole))
+    style.set_ticks(axes.xaxis, x, nbins=7, steps=[1, 2, 3, 4, 5, 10])
     axes.set_xlabel(label)
     axes.set_title(panel.title)
 
@@ -80,18 +100,8 @@ def incoherence_sensitivity(
     `marks` are thresholds that stand as lines: how fast the colour changes across a line is how
     much the verdict hangs on the threshold.
     """
-    figure = style.new_figure(style.COLUMN + 1.4, 3.0)
-    axes = figure.subplots()
-    mesh = axes.pcolormesh(
-        np.asarray(x, float),
-        np.asarray(delta, float),
-        np.ma.masked_invalid(np.asarray(strength, float).T),
-        shading="nearest",
-        vmin=0.0,
-        vmax=1.0,
-        cmap="viridis",
-        rasterized=True,
-    )
+    figure, (axes,) = style.new_panels(1, style.COLUMN + 1.4, 3.0)
+    mesh = style.draw_shares(axes, x, delta, strength)
     for i, mark in enumerate(sorted(marks, reverse=True)):
         axes.axhline(mark, color=style.RED, linewidth=0.9, linestyle="--")
         axes.annotate(

@@ -12,10 +12,26 @@ from numpy.typing import ArrayLike
 
 from chimera_hpc.measures import FEATURES
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
+
+
+def indicators_figure(data: FigureInput) -> Figure | None:
+    """Draw the Fourier indicators of the runs to show that oscillate (paper fig:9fourier)."""
+    runs = [(run, run.features) for run in data.shown if run.features is not None]
+    if not runs:
+        return None
+    titles = [f"{run.title}{_variations(run)}" for run, _ in runs]
+    return fourier_indicators([profiles_of(features) for _, features in runs], titles)
+
+
+def _variations(run: DrawnRun) -> str:
+    if run.triplet is None:
+        return ""
+    return f"\n$V$ = ({', '.join(f'{value:.3f}' for value in run.triplet)})"
 
 
 @dataclass(frozen=True)
-class Profiles:
+class IndicatorProfiles:
     """Indicators of one run; every array is (N,)."""
 
     phase: ArrayLike
@@ -26,10 +42,11 @@ class Profiles:
     frequency_std: ArrayLike
 
 
-def profiles_of(features: ArrayLike) -> Profiles:
-    """Return the profiles in an array of features (8, N), rows as in `features.FEATURES`."""
+def profiles_of(features: ArrayLike) -> IndicatorProfiles:
+    """Return the profiles in features (8, N), rows as in `measures.fourier.FEATURES`."""
     rows = dict(zip(FEATURES, np.asarray(features, dtype=np.float64), strict=True))
-    return Profiles(**{field.name: rows[field.name] for field in fields(Profiles)})
+    names = [field.name for field in fields(IndicatorProfiles)]
+    return IndicatorProfiles(**{name: rows[name] for name in names})
 
 
 _ROWS = (
@@ -40,7 +57,7 @@ _ROWS = (
 
 
 @style.styled
-def fourier_indicators(runs: Sequence[Profiles], titles: Sequence[str] = ()) -> Figure:
+def fourier_indicators(runs: Sequence[IndicatorProfiles], titles: Sequence[str] = ()) -> Figure:
     """Draw a column for each run: means as dots, one standard deviation to each side as a band."""
     figure = style.new_figure(max(style.COLUMN, 2.35 * len(runs)), 4.6)
     axes = figure.subplots(3, len(runs), squeeze=False, sharex="col")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +12,18 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
 
 _LARGEST_NUMBERED = 24
+
+
+def networks_figure(data: FigureInput) -> Figure | None:
+    """Draw the oriented rings, reoriented links in red (paper fig:orient, fig:orient:3)."""
+    entry = data.curves.get("networks")
+    if entry is None:
+        return None
+    panels = [(panel["title"], panel["links"]) for panel in entry["panels"]]
+    return networks(panels, entry["panels"][0]["reference"], entry["n_nodes"])
 
 
 @style.styled
@@ -21,8 +32,7 @@ def networks(panels: Sequence[tuple[str, ArrayLike]], reference: ArrayLike, n_no
 
     links and reference are (N1, 2) arrays of tail and head, 0-based, link by link in one order.
     """
-    figure = style.new_figure(2.3 * len(panels), 2.5)
-    axes = list(figure.subplots(1, len(panels), squeeze=False)[0])
+    figure, axes = style.new_panels(len(panels), 2.3 * len(panels), 2.5)
     for frame, (title, links) in zip(axes, panels, strict=True):
         draw_network(frame, links, reference, n_nodes)
         frame.set_title(title)
@@ -31,7 +41,7 @@ def networks(panels: Sequence[tuple[str, ArrayLike]], reference: ArrayLike, n_no
 
 
 def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: int) -> None:
-    """Put node 1 at the top and go clockwise; each link is a chord with an arrow at its middle."""
+    """Draw node 1 at the top, the others clockwise, each link as a chord with an arrow."""
     ends, usual = np.asarray(links, dtype=np.int64), np.asarray(reference, dtype=np.int64)
     places = node_places(n_nodes)
     turned = np.any(ends != usual, axis=1)
@@ -53,16 +63,8 @@ def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: in
         places[:, 0], places[:, 1], s=150.0 if numbered else 14.0, color="#007a6e", zorder=3.0
     )
     for i in range(n_nodes if numbered else 0):
-        axes.text(
-            places[i, 0],
-            places[i, 1] - 0.01,
-            str(i + 1),
-            ha="center",
-            va="center",
-            color="white",
-            fontweight="bold",
-            zorder=4.0,
-        )
+        look: dict[str, Any] = {"ha": "center", "va": "center", "fontweight": "bold"}
+        axes.text(places[i, 0], places[i, 1] - 0.01, str(i + 1), color="white", zorder=4.0, **look)
     axes.set_xlim(-1.18, 1.18)
     axes.set_ylim(-1.18, 1.18)
     axes.set_aspect("equal")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,39 +11,6 @@ from chimera_hpc.plot import style
 
 _LAST_TURNS = 1.5
 """Turns of every node that are drawn behind the chosen one's."""
-_COLOURS = (style.BLUE, style.RED, style.TEAL, "#997700", "#aa3377", "#555555")
-
-
-@style.styled
-def phase_portrait(
-    u: ArrayLike,
-    w: ArrayLike,
-    nodes: Sequence[int],
-    *,
-    title: str = "",
-    labels: tuple[str, str] = ("$u_i$", "$w_i$"),
-) -> Figure:
-    """Draw the orbits of some nodes (0-based) of u and w, both (T, N), over the cubic nullcline.
-
-    w is the sum that a node sees of its links, w = B1 v; du/dt = 0 on w = u - u^3 / 3.
-    """
-    figure = style.new_figure(style.COLUMN + 1.2, 3.1)
-    axes = figure.subplots()
-    across, along = np.asarray(u, float), np.asarray(w, float)
-    draw_nullcline(axes, 1.08 * float(np.nanmax(np.abs(across[:, list(nodes)]))))
-    for i, node in enumerate(nodes):
-        axes.plot(
-            across[:, node],
-            along[:, node],
-            color=_COLOURS[i % len(_COLOURS)],
-            linewidth=0.6,
-            label=f"node {node + 1}",
-        )
-    axes.set_xlabel(labels[0])
-    axes.set_ylabel(labels[1])
-    axes.set_title(title)
-    figure.legend(loc="outside right upper", handlelength=1.5)
-    return figure
 
 
 @style.styled
@@ -72,8 +37,7 @@ def ring_portrait(
     period : float, optional
         Length of a turn; without it the others are drawn whole.
     """
-    figure = style.new_figure(style.COLUMN + 1.6, 3.2)
-    axes = figure.subplots()
+    figure, (axes,) = style.new_panels(1, style.COLUMN + 1.6, 3.2)
     time, across, along = (np.asarray(x, dtype=np.float64) for x in (t, u, w))
     last = slice(None)
     if period is not None and np.isfinite(period):
@@ -83,7 +47,8 @@ def ring_portrait(
     if nullcline:
         draw_nullcline(axes, 1.05 * float(np.nanmax(np.abs(across))))
     dots = axes.scatter(
-        *(across[-1], along[-1]),
+        across[-1],
+        along[-1],
         s=14.0,
         c=np.arange(1, across.shape[1] + 1),
         cmap="twilight",

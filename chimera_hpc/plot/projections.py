@@ -15,11 +15,18 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
 
 LABELS = (r"$V_\theta$", r"$V_a$", r"$V_\Omega$ (1/time)")
 PLANES = ((0, 1), (0, 2), (1, 2))
 _MANY = 500
 """Points beyond which a PDF holds dots instead of a path for each."""
+
+
+def projections_figure(data: FigureInput, n_clusters: int) -> Figure | None:
+    """Draw the three planes of variations and a view in 3-D (paper fig:hvsnmin:orient:13D)."""
+    cut = data.classification.cuts[n_clusters]
+    return projections(data.triplets, cut.labels, cut.names) if cut.names else None
 
 
 @style.styled
@@ -51,18 +58,9 @@ def draw_projection(
     x, y = plane
     points, label = np.asarray(triplets, dtype=np.float64), np.asarray(labels)
     for i, name in enumerate(names):
-        kwargs: dict[str, Any] = {"color": style.colour_of(name), "alpha": 0.75} | look
         chosen = points[label == i]
-        axes.scatter(
-            chosen[:, x],
-            chosen[:, y],
-            s=11.0,
-            marker=style.marker_of(name),
-            linewidths=0.0,
-            label=style.spoken(name),
-            rasterized=len(chosen) > _MANY,
-            **kwargs,
-        )
+        kind = {"alpha": 0.75, "rasterized": len(chosen) > _MANY, **look}
+        style.scatter_class(axes, chosen[:, x], chosen[:, y], name, 11.0, **kind)
     axes.set_xlabel(LABELS[x])
     axes.set_ylabel(LABELS[y])
 

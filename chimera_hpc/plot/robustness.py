@@ -10,12 +10,24 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput, numbers
 
 _LOOKS: dict[str, dict[str, Any]] = {
     "orientation 1": {"color": style.GREEN, "marker": "*", "markersize": 6.5},
     "orientation 2": {"color": style.TEAL, "marker": "o", "markersize": 4.0},
 }
 _SPARE = ("#aa3377", "#997700", "#0057b8", "#777777")
+
+
+def robustness_figure(data: FigureInput) -> Figure | None:
+    """Draw W(Q_r), with the sweeps beside this one (paper ratio-o1-o2)."""
+    curves = [*data.beside.values(), data.curves]
+    bands = {}
+    for entry in (each["robustness"] for each in curves if "robustness" in each):
+        curve = entry["by"][entry["judge"]]
+        fraction, low, high = (numbers(curve[name]) for name in ("fraction", "low", "high"))
+        bands[entry["label"]] = Band(curve["x"], fraction, low, high)
+    return robustness(bands, label="reversed links $Q_r$") if bands else None
 
 
 @dataclass(frozen=True)
@@ -33,8 +45,7 @@ def robustness(
     curves: Mapping[str, Band], *, label: str = "reoriented links $Q_r$", value: str = "$W$"
 ) -> Figure:
     """Draw each named curve with its band; teal dots orientation 2, green stars orientation 1."""
-    figure = style.new_figure(style.COLUMN + 1.4, 2.8)
-    axes = figure.subplots()
+    figure, (axes,) = style.new_panels(1, style.COLUMN + 1.4, 2.8)
     spare = iter(_SPARE * (1 + len(curves) // len(_SPARE)))
     for name, curve in curves.items():
         look = _LOOKS.get(name) or {"color": next(spare), "marker": "s", "markersize": 3.5}

@@ -12,8 +12,26 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
 
 Panel = tuple[ArrayLike, ArrayLike]
+
+
+def space_time_figure(data: FigureInput) -> Figure | None:
+    """Draw u over node and time for the runs to show, with a close-up (paper fig:9dyn)."""
+    if not data.shown:
+        return None
+    fast = any(run.is_fast for run in data.shown)
+    return _of_runs(data.shown, [run.close_up for run in data.shown] if fast else None)
+
+
+def whole_run_figure(data: FigureInput) -> Figure | None:
+    """Draw u from t = 0 on for the runs to replay (paper fig:dynamics_P=1)."""
+    return _of_runs(data.whole) if data.whole else None
+
+
+def _of_runs(runs: Sequence[DrawnRun], zoom: Sequence[float] | None = None) -> Figure:
+    return space_time([(run.t, run.u) for run in runs], [run.title for run in runs], zoom=zoom)
 
 
 @style.styled
@@ -40,10 +58,10 @@ def space_time(
     largest = max(float(np.nanmax(np.abs(np.asarray(u)))) for _, u in panels)
     for i, panel in enumerate(panels):
         row, column = parts * (i // columns), i % columns
-        image = draw_space_time(axes[row, column], *panel, largest)
+        image = draw_u(axes[row, column], *panel, largest)
         axes[row, column].set_title(titles[i] if i < len(titles) else "")
         if (duration := closer[i]) is not None:
-            draw_space_time(axes[row + 1, column], *last_part(*panel, duration), largest)
+            draw_u(axes[row + 1, column], *last_part(*panel, duration), largest)
     for empty in (
         axes.reshape(rows, parts, columns).swapaxes(1, 2).reshape(-1, parts)[len(panels) :]
     ):
@@ -67,7 +85,7 @@ def last_part(
     return time[kept], np.asarray(u, dtype=np.float64)[kept]
 
 
-def draw_space_time(axes: Axes, t: ArrayLike, u: ArrayLike, largest: float) -> AxesImage:
+def draw_u(axes: Axes, t: ArrayLike, u: ArrayLike, largest: float) -> AxesImage:
     """Draw u (T, N), time along x and node 1 at the bottom; colours from -largest to largest."""
     time = np.asarray(t, dtype=np.float64)
     values = np.asarray(u, dtype=np.float64)

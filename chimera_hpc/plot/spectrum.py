@@ -10,6 +10,16 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
+
+
+def spectrum_figure(data: FigureInput) -> Figure | None:
+    """Draw one window, its spectrum and the parabola (paper fig:FFTsign)."""
+    entry = data.curves.get("spectrum")
+    if entry is None:
+        return None
+    keys = ("t", "y", "frequency", "amplitude", "peak")
+    return spectrum(Spectrum(**{key: entry[key] for key in keys}))
 
 
 @dataclass(frozen=True)
@@ -41,8 +51,7 @@ class Spectrum:
 @style.styled
 def spectrum(data: Spectrum, title: str = "") -> Figure:
     """Draw (a) signal and fit, (b) spectrum and parabola, (c) both maxima from near."""
-    figure = style.new_figure(style.PAGE + 0.4, 2.5)
-    axes = list(figure.subplots(1, 3))
+    figure, axes = style.new_panels(3, style.PAGE + 0.4, 2.5)
     axes[0].plot(data.t, data.y, color=style.BLUE, label="signal")
     if data.fit is not None:
         axes[0].plot(data.t, data.fit, "--", color=style.RED, label="fit")
@@ -94,14 +103,8 @@ def _draw_spectrum(axes: Axes, data: Spectrum, reach: float) -> None:
 def _draw_maxima(axes: Axes, data: Spectrum) -> None:
     frequency = float(np.asarray(data.frequency, float)[data.peak])
     amplitude = float(np.asarray(data.amplitude, float)[data.peak])
-    axes.plot(
-        frequency,
-        amplitude,
-        "o",
-        color=style.BLUE,
-        markersize=6.0,
-        label=f"({frequency:.4f}, {amplitude:.4f})",
-    )
+    label = f"({frequency:.4f}, {amplitude:.4f})"
+    axes.plot(frequency, amplitude, "o", color=style.BLUE, markersize=6.0, label=label)
     if not data.has_parabola:
         axes.legend(loc="upper center", fontsize=6.5)
         return

@@ -8,8 +8,20 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
 
-_LOOKS = (("origin", style.RED, "o"), ("upper", style.BLUE, "s"), ("lower", style.TEAL, "x"))
+_LOOKS = (
+    (0, "$u^* = 0$", {"color": style.RED, "marker": "o"}),
+    (1, r"$u^* = \sqrt{3}$", {"color": style.BLUE, "marker": "s", "fillstyle": "none"}),
+    (-1, r"$u^* = -\sqrt{3}$", {"color": style.TEAL, "marker": "x"}),
+)
+"""Sign of u*, label and look."""
+
+
+def stability_figure(data: FigureInput) -> Figure | None:
+    """Draw leading eigenvalues against P (paper sec:stabhomeq)."""
+    entry = data.curves.get("stability")
+    return None if entry is None else stability(entry["rows"])
 
 
 @style.styled
@@ -18,24 +30,21 @@ def stability(rows: Sequence[Mapping[str, Any]]) -> Figure:
 
     Each row has P, equilibrium (u*), leading_blocks, leading_jacobian and distance.
     """
-    figure = style.new_figure(style.PAGE, 2.6)
-    left, right = figure.subplots(1, 2)
-    for name, colour, marker in _LOOKS:
-        sign = {"origin": 0, "upper": 1, "lower": -1}[name]
+    figure, panels = style.new_panels(2, style.PAGE, 2.6)
+    left, right = panels
+    for sign, label, kind in _LOOKS:
         chosen = [r for r in rows if (r["equilibrium"] > 0) - (r["equilibrium"] < 0) == sign]
-        label = {"origin": "$u^* = 0$", "upper": r"$u^* = \sqrt{3}$", "lower": r"$u^* = -\sqrt{3}$"}
-        look = {"color": colour, "marker": marker, "markersize": 4.5, "linestyle": "none"}
-        look |= {"fillstyle": "none" if marker == "s" else "full"}
+        look: dict[str, Any] = {"markersize": 4.5, "linestyle": "none", **kind}
         degrees = [r["P"] for r in chosen]
-        left.plot(degrees, [r["leading_jacobian"] for r in chosen], label=label[name], **look)
+        left.plot(degrees, [r["leading_jacobian"] for r in chosen], label=label, **look)
         right.plot(degrees, [max(r["distance"], 1e-17) for r in chosen], **look)
     left.set_yscale("symlog", linthresh=0.01)
     left.axhline(0.0, color="#555555", linewidth=0.7)
     left.set_ylabel(r"largest $\mathrm{Re}\,\lambda$")
     right.set_yscale("log")
     right.set_ylabel(r"blocks $J_\alpha$ against full $J$")
-    for axes in (left, right):
+    for axes in panels:
         axes.set_xlabel("$P$")
-    style.letter([left, right])
+    style.letter(panels)
     figure.legend(loc="outside upper center", ncols=3)
     return figure

@@ -10,14 +10,18 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 COLUMN = 3.4
 PAGE = 7.0
@@ -60,13 +64,14 @@ SETTINGS: Any = {
 }
 
 Arguments = ParamSpec("Arguments")
+Made = TypeVar("Made")
 
 
-def styled(make: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
-    """Run a figure function under the project's settings, without a trace in matplotlib's own."""
+def styled(make: Callable[Arguments, Made]) -> Callable[Arguments, Made]:
+    """Run a figure function under the project's settings; matplotlib's own stay as they are."""
 
     @wraps(make)
-    def make_styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Figure:
+    def make_styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Made:
         with mpl.rc_context(SETTINGS):
             return make(*args, **kwargs)
 
@@ -78,8 +83,48 @@ def new_figure(width: float = PAGE, height: float = 2.4) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def new_panels(
+    count: int, width: float = PAGE, height: float = 2.4, **sharing: Any
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of this size in inches and its panels, side by side."""
+    figure = new_figure(width, height)
+    return figure, list(figure.subplots(1, count, squeeze=False, **sharing)[0])
+
+
+def scatter_class(
+    axes: Axes, x: ArrayLike, y: ArrayLike, name: str, size: float, **look: Any
+) -> None:
+    """Put the marker of a class, in its colour, at each (x, y); `look` overrides both."""
+    plain = {"marker": marker_of(name), "color": colour_of(name), "label": spoken(name)}
+    axes.scatter(x, y, s=size, linewidths=0.0, **{**plain, **look})
+
+
+def draw_shares(axes: Axes, x: ArrayLike, y: ArrayLike, shares: ArrayLike) -> QuadMesh:
+    """Draw shares (n_x, n_y) from 0 to 1 over x (n_x,) and y (n_y,), cells without one white.
+
+    x and y are centres of cells and need not be equally spaced.
+    """
+    return axes.pcolormesh(
+        np.asarray(x, float),
+        np.asarray(y, float),
+        np.ma.masked_invalid(np.asarray(shares, float).T),
+        shading="nearest",
+        vmin=0.0,
+        vmax=1.0,
+        cmap="viridis",
+        rasterized=True,
+    )
+
+
+def set_ticks(axis: Axis, values: ArrayLike, **rules: Any) -> None:
+    """Put ticks by the rules of MaxNLocator, at integers only if all values are integers."""
+    data = np.asarray(values, float)
+    whole = bool(np.all(data == np.rint(data)))
+    axis.set_major_locator(MaxNLocator(**{"integer": whole, **rules}))
+
+
 def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
-    """Write the figure as PNG (200 dots an inch) and PDF; return both paths.
+    """Write the figure as PNG (200 dots per inch) and PDF; return both paths.
 
     Equal figures give equal bytes: no date is written.
     """
@@ -143,7 +188,7 @@ def spoken(name: str) -> str:
 
 
 def class_handles(names: Iterable[str], size: float = 5.0) -> list[Line2D]:
-    """Return legend entries, one a class in the fixed order."""
+    """Return one legend entry per class, in the fixed order."""
     return [
         Line2D(
             [],

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chimera_hpc.measures.synthetic import profile_error
 from chimera_hpc.plot import style
+from chimera_hpc.plot.figure_input import FigureInput
+from chimera_hpc.plot.spacetime import space_time
 
 Quantities = Mapping[str, ArrayLike]
 """phase, amplitude and frequency, each (N,)."""
@@ -20,6 +23,21 @@ _ROWS = (
 )
 _LOOKS = ((style.GREEN, "."), ("#aa3377", "x"), (style.BLUE, "+"))
 _FLOOR = 1e-17
+
+
+def reconstruction_figure(data: FigureInput) -> Figure | None:
+    """Draw known and found profiles of the synthetic signal, and the errors (paper fig:FFT)."""
+    entry = data.curves.get("synthetic")
+    return None if entry is None else reconstruction(entry["truth"], entry["found"])
+
+
+def signal_figure(data: FigureInput) -> Figure | None:
+    """Draw the synthetic signal over node and time (paper fig:reconstrsign)."""
+    entry = data.curves.get("synthetic")
+    if entry is None:
+        return None
+    signal = entry["signal"]
+    return space_time([(signal["t"], signal["u"])], ["synthetic signal"], symbol="x_j(t)")
 
 
 @style.styled
@@ -40,7 +58,7 @@ def reconstruction(truth: Quantities, found: Mapping[str, Quantities]) -> Figure
             node, true, "s", color=style.BLACK, markersize=4.5, markerfacecolor="none", label="true"
         )
         for (method, values), (colour, marker) in zip(found.items(), _LOOKS, strict=False):
-            error = errors(true, np.asarray(values[name], float), name == "phase")
+            error = profile_error(true, np.asarray(values[name], float), name == "phase")
             estimate = true - error
             look = {"color": colour, "marker": marker, "markersize": 3.5, "linestyle": "none"}
             top.plot(node, estimate, label=method, **look)
@@ -56,11 +74,3 @@ def reconstruction(truth: Quantities, found: Mapping[str, Quantities]) -> Figure
     handles, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper center", ncols=len(names))
     return figure
-
-
-def errors(
-    true: NDArray[np.float64], found: NDArray[np.float64], periodic: bool
-) -> NDArray[np.float64]:
-    """Return true - found; for angles the smallest difference, in [-pi, pi)."""
-    difference = true - found
-    return (difference + np.pi) % (2.0 * np.pi) - np.pi if periodic else difference

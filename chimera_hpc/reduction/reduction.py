@@ -28,7 +28,7 @@ from chimera_hpc.store.store import Store
 
 if TYPE_CHECKING:
     from chimera_hpc.plot.catalogue import Maker
-    from chimera_hpc.plot.outcome import Outcome
+    from chimera_hpc.plot.figure_input import FigureInput
 
 RESULTS, FIGURES = "results.json", "figures"
 
@@ -152,7 +152,8 @@ class _Work:
         store, spec = self.store, self.store.sweep.reduction
         if not spec.analyses and not spec.atlas:
             return {}
-        from chimera_hpc.reduction.analyses import Given, analyse
+        from chimera_hpc.reduction.analyses import analyse
+        from chimera_hpc.reduction.analysis_input import AnalysisInput
         from chimera_hpc.reduction.atlases import atlases_of
 
         def series(i: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -162,7 +163,7 @@ class _Work:
             return sample_times(store.sweep), series_of(store, i)
 
         self.atlases = atlases_of(self.folder, spec.atlas, self.note)
-        given = Given(
+        given = AnalysisInput(
             sweep=store.sweep,
             points=store.points,
             status=self.status,
@@ -225,8 +226,8 @@ class _Work:
                 self.note(f"figure {name}: this sweep has nothing for it to show")
         return made
 
-    def _outcome(self, names: Mapping[str, object]) -> Outcome:
-        from chimera_hpc.plot.outcome import Outcome
+    def _outcome(self, names: Mapping[str, object]) -> FigureInput:
+        from chimera_hpc.plot.figure_input import FigureInput
         from chimera_hpc.reduction.atlases import curves_beside
         from chimera_hpc.reduction.runs import shown_runs, whole_runs
 
@@ -237,7 +238,7 @@ class _Work:
             verdicts = zip(atlas.classify(self.triplets).name, runs, self.status, strict=True)
             runs = [name if code == Status.DONE else run for name, run, code in verdicts]
         needs_runs = {"space_time", "indicators", "incoherence"} & set(names)
-        return Outcome(
+        return FigureInput(
             classification=made,
             triplets=self.triplets,
             axes=[(axis.symbol, axis.values) for axis in self.axes],
@@ -273,7 +274,9 @@ def _coverage(points: Mapping[str, int]) -> str:
     return f"{ran} of {total} points run" + (f": {', '.join(parts)}" if parts else "")
 
 
-def _write_figures(folder: Path, makers: Mapping[str, Maker], outcome: Outcome) -> tuple[Path, ...]:
+def _write_figures(
+    folder: Path, makers: Mapping[str, Maker], outcome: FigureInput
+) -> tuple[Path, ...]:
     """Draw into a folder of its own, then put each file in its place; remove those of before."""
     from chimera_hpc.plot.catalogue import is_figure_name
     from chimera_hpc.plot.style import save

@@ -14,7 +14,7 @@ from chimera_hpc.classify.modes import count_votes
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.job.tables import Keep
-from chimera_hpc.plot.outcome import Run
+from chimera_hpc.plot.figure_input import DrawnRun
 from chimera_hpc.reduction.cells import FreeAxis, describe
 from chimera_hpc.reduction.selection import find_point, single_point
 from chimera_hpc.store.schema import sample_times, series_mask
@@ -31,7 +31,7 @@ def shown_runs(
     names: Sequence[str | None],
     axes: Sequence[FreeAxis],
     say: Callable[[str], None],
-) -> list[Run]:
+) -> list[DrawnRun]:
     """Return the runs of ``reduction.show``, without it a run of each class of the cut."""
     selections = store.sweep.reduction.show
     if not selections:
@@ -66,7 +66,7 @@ def whole_runs(
     first: dict[str, int | float],
     axes: Sequence[FreeAxis],
     say: Callable[[str], None],
-) -> list[Run]:
+) -> list[DrawnRun]:
     """Return the runs of ``reduction.replay``, integrated from 0 to t_end."""
     runs = []
     for text in sweep.reduction.replay:
@@ -76,11 +76,13 @@ def whole_runs(
         if status.is_failure:
             say(f"not drawn: {text}: {status.sentence}")
             continue
-        runs.append(Run(_place(points.row(0), axes), sample_times(single), u))
+        runs.append(DrawnRun(_place(points.row(0), axes), sample_times(single), u))
     return runs
 
 
-def _load(store: Store, i: int, class_name: str, triplet: Array, axes: Sequence[FreeAxis]) -> Run:
+def _load(
+    store: Store, i: int, class_name: str, triplet: Array, axes: Sequence[FreeAxis]
+) -> DrawnRun:
     """Return a run of the store; its series is computed again where it is not kept."""
     place, features = _place(store.points.row(i), axes), None
     oscillates = bool(np.isfinite(triplet).all())
@@ -88,7 +90,7 @@ def _load(store: Store, i: int, class_name: str, triplet: Array, axes: Sequence[
         block, row = divmod(i, store.block_size)
         features = np.array(store.files.read("features", block)[row])
     t, u = sample_times(store.sweep), series_of(store, i)
-    return Run(place, t, u, class_name, features, triplet if oscillates else None)
+    return DrawnRun(place, t, u, class_name, features, triplet if oscillates else None)
 
 
 def series_of(store: Store, i: int) -> Array:

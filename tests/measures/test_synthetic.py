@@ -6,6 +6,7 @@ import pytest
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.measures import fourier_features, synthetic_profiles, synthetic_signal
 from chimera_hpc.measures.fourier import wrap
+from chimera_hpc.measures.synthetic import profile_error
 
 T = 500 + 0.01 * np.arange(50_001)
 
@@ -90,3 +91,10 @@ def test_three_steps_have_the_bias_of_the_parabola(signal):
 def test_three_steps_lose_the_phase_far_from_time_zero(signal):
     f = fourier_features(T, signal, clock="own", time_origin="absolute")
     assert errors(f)[2] > 1.0
+
+
+def test_errors_of_phases_are_taken_modulo_a_turn() -> None:
+    true, found = np.array([3.1, -3.1, 0.0]), np.array([-3.1, 3.1, 0.1])
+    gap = 2.0 * np.pi - 6.2
+    np.testing.assert_allclose(profile_error(true, found, periodic=True), [-gap, gap, -0.1])
+    np.testing.assert_allclose(profile_error(true, found, periodic=False), [6.2, -6.2, -0.1])

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.classification import classify
 from chimera_hpc.classify.stability import (
@@ -13,9 +14,10 @@ from chimera_hpc.classify.stability import (
     spectrum_distance,
 )
 from chimera_hpc.job import Sweep
-from chimera_hpc.job.selection import ANALYSES as KNOWN
+from chimera_hpc.job.registry import ANALYSES, load
 from chimera_hpc.network.topology import Topology
-from chimera_hpc.reduction.analyses import ANALYSES, Given, analyse
+from chimera_hpc.reduction.analyses import analyse
+from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 DONE, STEADY, FAILED = 1, 2, 4
 ATLAS = Atlas(
@@ -26,7 +28,7 @@ ATLAS = Atlas(
 )
 
 
-def given(grid: dict, status: list[int], atlases=None, reduction=None, **scalars) -> Given:
+def given(grid: dict, status: list[int], atlases=None, reduction=None, **scalars) -> AnalysisInput:
     """A tiny finished sweep; scalars that are not named are NaN."""
     tables = {"grid": grid, "reduction": reduction or {}, "features": {"groups": 2}}
     sweep = Sweep.from_dict({"name": "tiny", "model": "topological_fhn", **tables})
@@ -37,11 +39,7 @@ def given(grid: dict, status: list[int], atlases=None, reduction=None, **scalars
     triplets = np.stack([columns[name] for name in names[:3]], axis=1)
     codes = np.array(status)
     made = classify(triplets, np.where(np.isfinite(triplets).all(axis=1), codes, STEADY))
-    return Given(sweep, points, codes, columns, made, made.base, atlases or {})
-
-
-def test_names_of_analyses_are_known_to_the_job_file() -> None:
-    assert tuple(ANALYSES) == KNOWN
+    return AnalysisInput(sweep, points, codes, columns, made, made.base, atlases or {})
 
 
 def test_blocks_of_a_ring_have_the_spectrum_of_the_whole_jacobian() -> None:
@@ -73,7 +71,7 @@ def test_reorientation_breaks_the_equilibrium() -> None:
 
 
 def test_networks_count_the_links_that_turned() -> None:
-    made = ANALYSES["networks"](given({"P": 3, "Q": [0, 1, 3]}, [STEADY] * 3))
+    made = load(ANALYSES["networks"])(given({"P": 3, "Q": [0, 1, 3]}, [STEADY] * 3))
     assert [panel["reoriented"] for panel in made["panels"]] == [0, 2, 6]
 
 
@@ -81,7 +79,7 @@ def test_basin_counts_runs_within_their_own_radius() -> None:
     grid = {"P": [1, 2], "Q": 0, "delta": [0.5, 1.0], "seeds": 2}
     distance = [0.4, 0.5, 0.2, 2.0, 0.6, np.nan, 0.9, 0.9]
     state = [STEADY] * 5 + [FAILED] + [STEADY] * 2
-    made = ANALYSES["basin"](given(grid, state, distance=distance))
+    made = load(ANALYSES["basin"])(given(grid, state, distance=distance))
     np.testing.assert_array_equal(made["fraction"], [[1.0, 0.5], [0.0, 1.0]])
     np.testing.assert_array_equal(made["trials"], [[2, 2], [1, 2]])
     np.testing.assert_array_equal(made["safe_radius"], [0.5, np.nan])
@@ -89,7 +87,7 @@ def test_basin_counts_runs_within_their_own_radius() -> None:
 
 
 def test_oscillation_tells_slow_motion_from_rest_and_leaves_failed_runs_out() -> None:
-    made = ANALYSES["oscillation"](
+    made = load(ANALYSES["oscillation"])(
         given({"P": [1, 2], "Q": 1, "seeds": 2}, [STEADY, FAILED, DONE, 3])
     )
     names = ("oscillating", "moving", "resting", "runs")
@@ -108,7 +106,7 @@ def test_atlas_judges_runs_and_averages_those_of_the_modal_class() -> None:
         V_a=[0.1, 0.1, 0.0, np.nan],
         V_Omega=[0.1, 0.1, 0.0, np.nan],
     )
-    (cell,) = ANALYSES["atlas"](runs)["judges"]["other"]
+    (cell,) = load(ANALYSES["atlas"])(runs)["judges"]["other"]
     assert cell["class"] == "chimera"
     assert cell["votes"] == {"ordered": 1, "chimera": 2, "steady": 1}
     assert cell["triplet"] == pytest.approx([0.31, 0.1, 0.1])
@@ -124,7 +122,7 @@ def test_robustness_is_the_share_of_chimeras_by_reversed_links() -> None:
         V_a=[0.1, 0.1, 0.0, np.nan],
         V_Omega=[0.1, 0.1, 0.0, np.nan],
     )
-    made = ANALYSES["robustness"](runs)
+    made = load(ANALYSES["robustness"])(runs)
     curve = made["by"]["other"]
     assert made["label"] == "orientation 1"
     assert (curve["hits"], curve["trials"]) == ([2, 0], [2, 2])
@@ -141,7 +139,7 @@ def test_incoherence_scales_delta_by_the_range_of_each_run() -> None:
         local_sigma_2=[0.5, 0.5],
         range_u=[4.0, 2.0],
     )
-    made = ANALYSES["incoherence"](runs)
+    made = load(ANALYSES["incoherence"])(runs)
     (row,) = made["range"]["by_delta"][0]["rows"]
     # 0.1 * 4 = 0.4 lies between both deviations, 0.1 * 2 below both
     np.testing.assert_array_equal(row["runs"], [0.5, 1.0])
@@ -150,7 +148,7 @@ def test_incoherence_scales_delta_by_the_range_of_each_run() -> None:
     np.testing.assert_array_equal(absolute["runs"], [1.0, 1.0])
 
 
-def three_kinds(n: int = 12) -> Given:
+def three_kinds(n: int = 12) -> AnalysisInput:
     rng = np.random.default_rng(3)
     kind = np.repeat([0, 1, 2], n)
     scatter = 0.01 * rng.standard_normal(3 * n)
@@ -170,13 +168,13 @@ def three_kinds(n: int = 12) -> Given:
 
 
 def test_sigma_l_finds_three_classes_along_p() -> None:
-    made = ANALYSES["sigma-l"](three_kinds())
+    made = load(ANALYSES["sigma-l"])(three_kinds())
     assert made["n_classes"] == 3
     assert [cell["class"] for cell in made["cells"]] == ["ordered", "chimera", "disordered"]
 
 
 def test_three_methods_that_agree_have_diagonal_matrices() -> None:
-    made = ANALYSES["agreement"](three_kinds())
+    made = load(ANALYSES["agreement"])(three_kinds())
     assert [pair["agreement"] for pair in made["pairs"]] == [1.0, 1.0, 1.0]
     assert [pair["cells_equal"] for pair in made["pairs"]] == [3, 3, 3]
     assert made["differing"] == []
@@ -185,7 +183,7 @@ def test_three_methods_that_agree_have_diagonal_matrices() -> None:
 def test_methods_that_differ_are_listed_by_cell() -> None:
     runs = three_kinds()
     runs.scalars["local_sigma_2"][:12] = 2.0  # P = 5: half of the groups are incoherent now
-    made = ANALYSES["agreement"](runs)
+    made = load(ANALYSES["agreement"])(runs)
     assert [cell["P"] for cell in made["differing"]] == [5]
     np.testing.assert_array_equal(made["pairs"][0]["counts"], [[0, 12, 0], [0, 12, 0], [0, 0, 12]])
 
@@ -199,29 +197,46 @@ def test_variations_are_quantiles_of_oscillating_runs() -> None:
         V_Omega=[0.0] * 3 + [np.nan],
         sigma_1=[1.0, 2.0, 3.0, 9.0],
     )
-    (cell,) = ANALYSES["variations"](runs)["cells"]
+    (cell,) = load(ANALYSES["variations"])(runs)["cells"]
     assert (cell["runs"], cell["V_theta"][3], cell["sigma_1"][-1]) == (3, 0.2, 3.0)
 
 
 def test_the_synthetic_signal_is_reconstructed() -> None:
-    made = ANALYSES["synthetic"](given({"P": 5, "Q": 5}, [DONE]))
+    made = load(ANALYSES["synthetic"])(given({"P": 5, "Q": 5}, [DONE]))
     assert made["largest_error"]["sine-fit"]["phase"] < 0.02
     assert made["largest_error"]["sine-fit"]["frequency"] < 1e-6
 
 
 def test_spectrum_of_a_cosine_has_its_peak_in_the_ninth_line() -> None:
-    runs = given({"P": 12, "Q": 12}, [DONE], reduction={"show": ["P=12"]})
+    runs = given({"P": 12, "Q": 12, "seeds": 2}, [DONE] * 2, reduction={"show": ["P=12"]})
     t = 950.0 + 0.01 * np.arange(5001)
     u = np.cos(2.0 * np.pi * 4.0 * t)[:, None] * np.ones(3)
-    made = ANALYSES["spectrum"](Given(**{**vars(runs), "series": lambda i: (t, u)}))
+    made = load(ANALYSES["spectrum"])(AnalysisInput(**{**vars(runs), "series": lambda i: (t, u)}))
     assert (made["peak"], made["n_samples"]) == (9, 226)
     assert made["amplitude"][9] == pytest.approx(1.0, abs=0.01)
 
 
-def test_what_cannot_be_made_is_said_and_the_rest_is_made() -> None:
-    wish = {"analyses": ["atlas", "agreement", "oscillation"]}
+@pytest.mark.parametrize(
+    ("name", "lacking"),
+    [
+        ("atlas", "reduction.atlas names a sweep"),
+        ("robustness", "reduction.atlas names a sweep"),
+        ("agreement", "reduction.deltas is needed"),
+        ("spectrum", "reduction.show names no run"),
+    ],
+)
+def test_what_cannot_be_made_is_said_and_the_rest_is_made(name: str, lacking: str) -> None:
+    wish = {"analyses": [name, "oscillation"]}
     said: list[str] = []
     made = analyse(given({"P": 5, "Q": 5, "seeds": 2}, [DONE, DONE], reduction=wish), said.append)
     assert list(made) == ["oscillation"]
-    assert "reduction.atlas" in said[0]
-    assert "reduction.deltas" in said[1]
+    assert len(said) == 1
+    assert said[0].startswith(f"analysis {name}: ")
+    assert lacking in said[0]
+
+
+@pytest.mark.parametrize("name", ["sigma-l", "agreement", "incoherence", "variations", "spectrum"])
+def test_analyses_of_runs_need_two_of_them(name: str) -> None:
+    runs = given({"P": 5, "Q": 5, "seeds": 2}, [DONE, FAILED])
+    with pytest.raises(BadInput, match="too few runs yet"):
+        load(ANALYSES[name])(runs)

@@ -11,11 +11,15 @@ from matplotlib.colors import to_hex
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import classify
-from chimera_hpc.job import selection
-from chimera_hpc.plot import catalogue as figures
+from chimera_hpc.job.registry import FIGURES, load
 from chimera_hpc.plot.catalogue import choose, is_figure_name
-from chimera_hpc.plot.curves import CURVE_FIGURES
-from chimera_hpc.plot.outcome import Outcome, Run
+from chimera_hpc.plot.classification import classification_figure
+from chimera_hpc.plot.dendrogram import dendrogram_figure
+from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
+from chimera_hpc.plot.indicators import indicators_figure
+from chimera_hpc.plot.modes import modal_classes_figure
+from chimera_hpc.plot.projections import projections_figure
+from chimera_hpc.plot.spacetime import space_time_figure, whole_run_figure
 from chimera_hpc.plot.style import BLACK, BLUE, RED
 
 CENTRES = np.array([[0.05, 0.01, 0.001], [0.3, 0.1, 0.11], [0.55, 0.02, 0.01]])
@@ -27,7 +31,7 @@ def run(place="$P = Q = 12$, seed 0", frequency=4.0, **changes):
     u = np.sin(2.0 * np.pi * frequency * T[:, None] + np.arange(8))
     features = np.full((8, 8), 0.1)
     features[1] = frequency
-    made = Run(place, T, u, "disordered", features, np.array([0.575, 0.018, 0.012]))
+    made = DrawnRun(place, T, u, "disordered", features, np.array([0.575, 0.018, 0.012]))
     return replace(made, **changes)
 
 
@@ -42,16 +46,11 @@ def outcome(n_axes=1, status=Status.DONE, **changes):
     columns = [("$P = Q$", np.arange(2, 11)), ("$b$", np.tile([0.1, 0.2, 0.3], 3))]
     columns.append(("$c$", np.arange(9.0)))
     axes = columns[:n_axes]
-    return Outcome(made, triplets, axes, {k: cells for k in made.cuts}, **changes)
+    return FigureInput(made, triplets, axes, {k: cells for k in made.cuts}, **changes)
 
 
 def colours_of_points(axes):
     return {to_hex(colour) for dots in axes.collections for colour in dots.get_facecolors()}
-
-
-def test_registry_has_the_names_that_a_job_may_use():
-    assert tuple(figures.FIGURES) == (*selection.FIGURES, *selection.CURVE_FIGURES)
-    assert tuple(figures.CUT_FIGURES) == selection.CUT_FIGURES
 
 
 def test_auto_draws_the_first_cut_in_every_way_and_the_composite_of_each():
@@ -61,7 +60,7 @@ def test_auto_draws_the_first_cut_in_every_way_and_the_composite_of_each():
         "dendrogram_4", "projections_4", "modal_classes_4",
         "classification_4", "classification_3", "classification_5",
     ]  # fmt: skip
-    assert set(names[3:-6]) == set(CURVE_FIGURES)
+    assert names[:-6] == list(FIGURES)
 
 
 def test_list_of_figures_draws_these_and_no_others():
@@ -81,7 +80,7 @@ def test_numbered_figure_shows_that_cut():
     assert len(names) == 5
 
 
-@pytest.mark.parametrize("name", [*figures.FIGURES, "dendrogram_3", "classification_12"])
+@pytest.mark.parametrize("name", [*FIGURES, "dendrogram_3", "classification_12"])
 def test_own_files_are_recognised(name):
     assert is_figure_name(name)
 
@@ -92,14 +91,14 @@ def test_files_of_others_are_not_taken_for_own(name):
 
 
 def test_space_time_shows_each_run_over_a_close_up_of_twelve_periods():
-    drawn = figures.draw_space_time(outcome(shown=[run("one"), run("two", 2.0)]))
+    drawn = space_time_figure(outcome(shown=[run("one"), run("two", 2.0)]))
     images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
     assert len(images) == 4
     starts = [round(float(image.get_extent()[0]), 1) for image in images]
     assert starts == [0.0, 0.0, 17.0, 14.0]  # periods of 0.25 and 0.5
 
 
-@pytest.mark.parametrize("draw", [figures.draw_space_time, figures.draw_indicators])
+@pytest.mark.parametrize("draw", [space_time_figure, indicators_figure])
 def test_titles_of_neighbours_stay_apart(draw):
     drawn = draw(outcome(shown=[run("$P = Q = 21$, $\\epsilon = 0.05$, seed 0")] * 3))
     drawn.draw_without_rendering()
@@ -113,7 +112,7 @@ def test_titles_of_neighbours_stay_apart(draw):
 
 
 def test_times_of_neighbours_stay_apart():
-    drawn = figures.draw_space_time(outcome(shown=[run(t=T + 980.0, frequency=1.17)] * 3))
+    drawn = space_time_figure(outcome(shown=[run(t=T + 980.0, frequency=1.17)] * 3))
     drawn.draw_without_rendering()
     panels = [axes for axes in drawn.axes if axes.get_images()]
     boxes = [
@@ -128,7 +127,7 @@ def test_times_of_neighbours_stay_apart():
 
 def test_indicators_tell_the_variations_and_leave_out_still_runs():
     still = run(features=None, triplet=None)
-    drawn = figures.draw_indicators(outcome(shown=[still, run()]))
+    drawn = indicators_figure(outcome(shown=[still, run()]))
     assert len(drawn.axes) == 3
     assert drawn.axes[0].get_title().endswith("$V$ = (0.575, 0.018, 0.012)")
     (dots,) = drawn.axes[2].lines
@@ -136,7 +135,7 @@ def test_indicators_tell_the_variations_and_leave_out_still_runs():
 
 
 def test_slow_run_beside_a_fast_one_is_drawn_over_half_of_its_series():
-    drawn = figures.draw_space_time(outcome(shown=[run("one"), run("slow", 0.1)]))
+    drawn = space_time_figure(outcome(shown=[run("one"), run("slow", 0.1)]))
     images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
     starts = [round(float(image.get_extent()[0]), 1) for image in images]
     assert starts == [0.0, 0.0, 17.0, 10.0]
@@ -144,38 +143,46 @@ def test_slow_run_beside_a_fast_one_is_drawn_over_half_of_its_series():
 
 def test_still_run_has_no_close_up():
     still = run(features=None, triplet=None, class_name="steady")
-    drawn = figures.draw_space_time(outcome(shown=[still]))
+    drawn = space_time_figure(outcome(shown=[still]))
     assert sum(bool(axes.get_images()) for axes in drawn.axes) == 1
 
 
 def test_whole_run_is_drawn_from_its_begin_to_its_end():
-    drawn = figures.draw_whole_run(outcome(whole=[run(class_name="")]))
+    drawn = whole_run_figure(outcome(whole=[run(class_name="")]))
     left, right, *_ = drawn.axes[0].get_images()[0].get_extent()
     assert (left, right) == pytest.approx((T[0], T[-1]), abs=0.02)
     assert drawn.axes[0].get_title() == "$P = Q = 12$, seed 0"
 
 
 def test_modal_classes_go_against_one_axis_or_over_two():
-    line = figures.draw_modal_classes(outcome(1), 3).axes[0]
+    line = modal_classes_figure(outcome(1), 3).axes[0]
     assert line.get_xlabel() == "$P = Q$"
     assert [tick.get_text() for tick in line.get_yticklabels()] == list(NAMES)
-    plane = figures.draw_modal_classes(outcome(2), 3).axes[0]
+    plane = modal_classes_figure(outcome(2), 3).axes[0]
     assert (plane.get_xlabel(), plane.get_ylabel()) == ("$P = Q$", "$b$")
     assert colours_of_points(plane) == {RED, BLUE, BLACK}
 
 
-def test_composite_has_tree_plane_and_classes():
+def test_composite_has_tree_plane_and_classes(rendered):
     for n_axes, label in ((1, ""), (2, "$b$")):
-        tree, plane, classes = figures.draw_classification(outcome(n_axes), 3).axes
+        drawn = rendered(classification_figure(outcome(n_axes), 3))
+        tree, plane, classes = drawn.axes
+        assert [axes.get_title(loc="left") for axes in drawn.axes] == ["(a)", "(b)", "(c)"]
+        assert [text.get_text() for text in drawn.legends[0].get_texts()] == list(NAMES)
         assert tree.get_xlabel() == "18 runs"
         assert colours_of_points(plane) == {RED, BLUE, BLACK}
         assert classes.get_ylabel() == label
 
 
+def test_five_classes_are_five_colours():
+    plane = classification_figure(outcome(), 5).axes[1]
+    assert len(colours_of_points(plane)) == 5
+
+
 def test_dendrogram_has_the_line_of_its_cut():
     data = outcome()
     for k, cut in data.classification.cuts.items():
-        line = figures.draw_dendrogram(data, k).axes[0].lines[0]
+        line = dendrogram_figure(data, k).axes[0].lines[0]
         assert line.get_ydata()[0] == cut.depth
 
 
@@ -188,7 +195,7 @@ def test_judged_cells_are_diamonds_in_a_panel_for_each_value_of_the_first_axis(n
     axes = list(made.axes)
     if n_axes == 2:
         axes[0] = ("$P = Q$", np.repeat([2, 3], [4, 5]))
-    panels = CURVE_FIGURES["atlas"](replace(made, curves=curves, axes=axes)).axes[: len(titles)]
+    panels = load(FIGURES["atlas"])(replace(made, curves=curves, axes=axes)).axes[: len(titles)]
     for panel, title in zip(panels, titles, strict=True):
         assert panel.get_title(loc="left").endswith(title)
     diamonds = [len(panel.collections[-1].get_offsets()) for panel in panels]
@@ -198,19 +205,19 @@ def test_judged_cells_are_diamonds_in_a_panel_for_each_value_of_the_first_axis(n
 @pytest.mark.parametrize("n_axes", [0, 3])
 def test_classes_are_not_drawn_over_no_axis_or_three(n_axes):
     data = outcome(n_axes)
-    assert figures.draw_modal_classes(data, 3) is None
-    assert figures.draw_classification(data, 3) is None
-    assert figures.draw_dendrogram(data, 3) is not None
+    assert modal_classes_figure(data, 3) is None
+    assert classification_figure(data, 3) is None
+    assert dendrogram_figure(data, 3) is not None
 
 
 def test_sweep_without_oscillation_has_its_classes_only():
     data = outcome(status=Status.STEADY)
-    for draw in (figures.draw_dendrogram, figures.draw_projections, figures.draw_classification):
+    for draw in (dendrogram_figure, projections_figure, classification_figure):
         assert draw(data, 3) is None
-    rows = figures.draw_modal_classes(data, 3).axes[0].get_yticklabels()
+    rows = modal_classes_figure(data, 3).axes[0].get_yticklabels()
     assert [row.get_text() for row in rows] == ["steady"]
 
 
-@pytest.mark.parametrize("draw", figures.FIGURES.values(), ids=figures.FIGURES)
-def test_nothing_to_show_is_no_figure(draw):
-    assert draw(outcome()) is None
+@pytest.mark.parametrize("place", FIGURES.values(), ids=FIGURES)
+def test_nothing_to_show_is_no_figure(place):
+    assert load(place)(outcome()) is None

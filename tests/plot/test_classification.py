@@ -11,13 +11,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from chimera_hpc.plot import style
-from chimera_hpc.plot.classification import (
-    ClassifiedRuns,
-    classification_against,
-    classification_map,
-)
 from chimera_hpc.plot.dendrogram import brackets, dendrogram
-from chimera_hpc.plot.modes import class_against, class_map
+from chimera_hpc.plot.modes import modal_classes
 from chimera_hpc.plot.projections import projections
 
 Render = Callable[[Figure], Figure]
@@ -88,7 +83,7 @@ def test_projections_show_three_planes_and_a_solid(rendered: Render) -> None:
 
 def test_class_against_puts_each_class_in_its_row(rendered: Render, colour_at: Any) -> None:
     classes = ["steady", "ordered", "disordered", None, "chimera"]
-    figure = rendered(class_against([2, 3, 4, 5, 6], classes, label="$P = Q$"))
+    figure = rendered(modal_classes([("$P = Q$", [2, 3, 4, 5, 6])], classes))
     axes = figure.axes[0]
     rows = [text.get_text() for text in axes.get_yticklabels()]
     assert rows == ["steady", "ordered", "chimera", "disordered"]
@@ -100,7 +95,7 @@ def test_class_against_puts_each_class_in_its_row(rendered: Render, colour_at: A
 
 def test_votes_are_discs_with_area_by_share() -> None:
     votes = [{"ordered": 15, "chimera": 5}, {"chimera": 20}]
-    axes = class_against([1, 2], ["ordered", "chimera"], votes).axes[0]
+    axes = modal_classes([("$P$", [1, 2])], ["ordered", "chimera"], votes).axes[0]
     discs = {
         tuple(c.get_offsets()[0]): float(c.get_sizes()[0])
         for c in axes.collections
@@ -115,7 +110,7 @@ def test_votes_are_discs_with_area_by_share() -> None:
 def test_class_map_colours_every_cell(rendered: Render, colour_at: Any) -> None:
     p, q = [3, 3, 4, 4, 5], [0, 3, 0, 4, 2]
     classes = ["steady", "ordered", "chimera", "disordered-2", None]
-    figure = rendered(class_map(p, q, classes))
+    figure = rendered(modal_classes([("$P$", p), ("$Q$", q)], classes))
     axes = figure.axes[0]
     for x, y, name in list(zip(p, q, classes, strict=True))[:4]:
         assert colour_at(axes, x, y) == [rgb(name)]
@@ -127,43 +122,5 @@ def test_class_map_colours_every_cell(rendered: Render, colour_at: Any) -> None:
 
 def test_legend_of_many_classes_fits_a_narrow_figure(rendered: Render) -> None:
     classes = ["ordered-1", "ordered-2", "chimera-1", "disordered-1", "disordered-2", "steady"]
-    figure = rendered(class_map(range(6), range(6), classes))
+    figure = rendered(modal_classes([("$P$", range(6)), ("$Q$", range(6))], classes))
     assert len(figure.legends[0].get_texts()) == 6
-
-
-@pytest.fixture
-def runs() -> ClassifiedRuns:
-    return ClassifiedRuns(LINKAGE, LEAVES, NAMES, 3.5, TRIPLETS, np.array([0, 0, 1, 1]))
-
-
-def test_classification_joins_tree_plane_and_classes(
-    rendered: Render, runs: ClassifiedRuns, colour_at: Any
-) -> None:
-    figure = rendered(classification_against(runs, [6, 7, 8], ["ordered", "chimera", "steady"]))
-    tree, plane, modal = figure.axes
-    assert [axes.get_title(loc="left") for axes in figure.axes] == ["(a)", "(b)", "(c)"]
-    assert set(tree.lines[0].get_ydata()) == {3.5}
-    assert (plane.get_xlabel(), plane.get_ylabel()) == (r"$V_\theta$", "$V_a$")
-    assert colour_at(modal, 7, 2) == [rgb("chimera")]
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["ordered", "chimera", "steady"]
-
-
-def test_five_classes_are_five_colours(rendered: Render) -> None:
-    names = ("ordered-1", "ordered-2", "chimera", "disordered-1", "disordered-2")
-    rng = np.random.default_rng(0)
-    triplets, labels = rng.random((10, 3)), np.repeat(np.arange(5), 2)
-    runs = ClassifiedRuns(LINKAGE, LEAVES, names, 3.5, triplets, labels)
-    figure = rendered(classification_against(runs, range(5), names))
-    plane = figure.axes[1]
-    colours = [tuple(np.round(c.get_facecolors()[0][:3], 6)) for c in plane.collections]
-    assert colours == [rgb(name) for name in names]
-    assert len(set(colours)) == 5
-
-
-def test_classification_map_has_the_plane_as_third_panel(
-    rendered: Render, runs: ClassifiedRuns, colour_at: Any
-) -> None:
-    figure = rendered(classification_map(runs, [3, 3], [0, 1], ["steady", "chimera"]))
-    assert colour_at(figure.axes[2], 3, 1) == [rgb("chimera")]
-    assert figure.axes[2].get_ylabel() == "$Q$"

@@ -1,4 +1,4 @@
-"""Space-time plots, indicators, phase portraits."""
+"""Space-time plots, indicators."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
-from chimera_hpc.plot.indicators import Profiles, fourier_indicators
-from chimera_hpc.plot.portrait import phase_portrait
+from chimera_hpc.plot.indicators import IndicatorProfiles, fourier_indicators
 from chimera_hpc.plot.spacetime import last_part, space_time
 
 Render = Callable[[Figure], Figure]
@@ -64,10 +63,10 @@ def test_last_part_keeps_both_ends() -> None:
     assert u.tolist() == [[4.0, 5.0], [6.0, 7.0]]
 
 
-def profiles(std: float = 0.1) -> Profiles:
+def profiles(std: float = 0.1) -> IndicatorProfiles:
     flat = np.full(8, std)
     phase = np.linspace(-3.0, 3.0, 8)
-    return Profiles(phase, np.arange(8.0), np.full(8, 4.0), flat, 2 * flat, flat)
+    return IndicatorProfiles(phase, np.arange(8.0), np.full(8, 4.0), flat, 2 * flat, flat)
 
 
 def test_indicators_have_a_column_a_run_and_three_rows(rendered: Render) -> None:
@@ -117,15 +116,3 @@ def test_constant_profile_does_not_look_like_structure() -> None:
 def test_single_window_has_no_band_and_no_failure(rendered: Render) -> None:
     figure = rendered(fourier_indicators([profiles(np.nan)]))
     assert len(figure.axes[1].lines) == 1
-
-
-def test_portrait_draws_chosen_nodes_over_the_nullcline(rendered: Render) -> None:
-    w = np.sin(T[:, None] + np.arange(8))
-    figure = rendered(phase_portrait(U, w, [0, 5], title="here"))
-    nullcline, first, second = figure.axes[0].lines
-    x, y = nullcline.get_data()
-    np.testing.assert_allclose(y, x - x**3 / 3.0)
-    np.testing.assert_array_equal(first.get_data(), [U[:, 0], w[:, 0]])
-    np.testing.assert_array_equal(second.get_data(), [U[:, 5], w[:, 5]])
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels[1:] == ["node 1", "node 6"]

@@ -15,12 +15,12 @@ from chimera_hpc.plot import style
 from chimera_hpc.plot.agreement import Comparison, confusion_matrices, verdicts
 from chimera_hpc.plot.atlas import Diamonds, atlas
 from chimera_hpc.plot.basin import basin
-from chimera_hpc.plot.density import density_classes
+from chimera_hpc.plot.density import Density, density_classes
 from chimera_hpc.plot.incoherence import Strengths, incoherence
 from chimera_hpc.plot.network import arrow_heads, networks, node_places
 from chimera_hpc.plot.robustness import Band, robustness
 from chimera_hpc.plot.spectrum import Spectrum, spectrum, vertex
-from chimera_hpc.plot.synthetic import errors, reconstruction
+from chimera_hpc.plot.synthetic import reconstruction
 
 Render = Callable[[Figure], Figure]
 
@@ -92,9 +92,8 @@ def test_density_shows_histogram_curve_cuts_and_classes(rendered: Render) -> Non
     values, labels = np.array([0.1, 0.2, 1.0, 2.0]), [0, 0, 1, 2]
     names = ("ordered", "chimera", "disordered")
     grid = np.linspace(0.0, 3.0, 50)
-    figure = rendered(
-        density_classes(values, grid, np.exp(-grid), [0.5, 1.5], names, [2, 3, 11, 14], labels)
-    )
+    made = Density(values, grid, np.exp(-grid), [0.5, 1.5], names, labels)
+    figure = rendered(density_classes(made, [2, 3, 11, 14]))
     left, right = figure.axes
     areas = sum(bar.get_height() * bar.get_width() for bar in left.patches)
     assert areas == pytest.approx(1.0)
@@ -177,13 +176,6 @@ def test_reconstruction_with_two_methods_shows_sizes_on_a_logarithmic_scale(
         assert axes.get_yscale() == "log"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["true", "three steps", "sine fit"]
-
-
-def test_errors_of_phases_are_taken_modulo_a_turn() -> None:
-    true, found = np.array([3.1, -3.1, 0.0]), np.array([-3.1, 3.1, 0.1])
-    gap = 2.0 * np.pi - 6.2
-    np.testing.assert_allclose(errors(true, found, periodic=True), [-gap, gap, -0.1])
-    np.testing.assert_allclose(errors(true, found, periodic=False), [6.2, -6.2, -0.1])
 
 
 @pytest.fixture

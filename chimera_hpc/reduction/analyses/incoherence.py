@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify.agreement import classes_by_incoherence, confusion
-from chimera_hpc.classify.density import DensityClasses, density_classes, stable_bandwidths
+from chimera_hpc.classify.density import density_classes, stable_bandwidths
 from chimera_hpc.classify.naming import CLASSES, STEADY
 from chimera_hpc.measures.incoherence import discontinuity_measure, strength_of_incoherence
-from chimera_hpc.reduction.analyses.given import Given
 from chimera_hpc.reduction.analyses.judged import most_frequent
+from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 Array = NDArray[np.float64]
 _CURVE = np.geomspace(1e-4, 1.0, 81)
 
 
-def incoherence(given: Given) -> dict[str, Any]:
+def incoherence(given: AnalysisInput) -> dict[str, Any]:
     """SI and discontinuity measure for ``reduction.deltas``, and SI against delta as a curve.
 
     Under both units of delta: ``range``, a fraction of the range of u of each run, and
@@ -28,6 +29,7 @@ def incoherence(given: Given) -> dict[str, Any]:
     discontinuity measure, share of runs with SI = 0, between, and 1, and the modal of these three
     classes. A run without a result is left out.
     """
+    given.need_runs()
     spec = given.sweep.reduction
     return {
         "unit": spec.delta_unit,
@@ -38,19 +40,19 @@ def incoherence(given: Given) -> dict[str, Any]:
     }
 
 
-def _by_unit(given: Given, unit: str) -> dict[str, Any]:
+def _by_unit(given: AnalysisInput, unit: str) -> dict[str, Any]:
     local, scale = given.local_sigma(), unit_of(given, unit)
     curve = np.stack([_strength(local, scale, delta) for delta in _CURVE], axis=1)
     return {
         "by_delta": [_at_delta(given, local, scale, d) for d in given.sweep.reduction.deltas],
         "curve": {
             "delta": _CURVE,
-            "mean": [_mean(curve[_runs(given, i)], 0) for i in range(given.n_cells)],
+            "mean": [_mean(curve[given.runs(i)], 0) for i in range(given.n_cells)],
         },
     }
 
 
-def unit_of(given: Given, unit: str) -> Array:
+def unit_of(given: AnalysisInput, unit: str) -> Array:
     """What a delta is multiplied with for each run, shape (n,)."""
     return given.scalars["range_u"] if unit == "range" else np.ones(len(given.status))
 
@@ -62,14 +64,14 @@ def _strength(local: Array, scale: Array, delta: float) -> Array:
     return made
 
 
-def _at_delta(given: Given, local: Array, scale: Array, delta: float) -> dict[str, Any]:
+def _at_delta(given: AnalysisInput, local: Array, scale: Array, delta: float) -> dict[str, Any]:
     strength = _strength(local, scale, delta)
     known = np.isfinite(scale)
     jumps = np.full(len(local), np.nan)
     jumps[known] = discontinuity_measure(local[known], delta * scale[known])
     rows = []
     for i in range(given.n_cells):
-        runs = _runs(given, i)
+        runs = given.runs(i)
         votes = Counter(classes_by_incoherence(strength[runs]))
         rows.append(
             {
@@ -84,25 +86,22 @@ def _at_delta(given: Given, local: Array, scale: Array, delta: float) -> dict[st
     return {"delta": delta, "rows": rows}
 
 
-def _runs(given: Given, cell: int) -> NDArray[np.int64]:
-    return np.flatnonzero((given.cell == cell) & given.has_result)
-
-
 def _mean(values: Array, axis: int | None = None) -> Any:
     return values.mean(axis=axis) if len(values) else np.full(values.shape[1:], np.nan)
 
 
-def sigma_l(given: Given) -> dict[str, Any]:
+def sigma_l(given: AnalysisInput) -> dict[str, Any]:
     """Classes of sigma_1 by the modes of its kernel density (paper fig:sigmal).
 
     The number of classes is the density's own at Silverman's bandwidth; ``bandwidths_of_three`` is
     the interval of bandwidths with three modes.
     """
-    made = density_by_sigma(given)
-    values = _sigma(given)
+    given.need_runs()
+    values = np.where(given.has_result, given.scalars["sigma_1"], np.nan)
+    made = density_classes(values)
     rows = []
     for i in range(given.n_cells):
-        labels = made.labels[_runs(given, i)]
+        labels = made.labels[given.runs(i)]
         votes = Counter(made.names[k] for k in labels if k >= 0)
         modal = max(votes, key=lambda name: (votes[name], -made.names.index(name)), default=None)
         rows.append({**given.place(i), "class": modal, "votes": dict(votes)})
@@ -122,27 +121,21 @@ def sigma_l(given: Given) -> dict[str, Any]:
     }
 
 
-def _sigma(given: Given) -> Array:
-    return np.where(given.has_result, given.scalars["sigma_1"], np.nan)
-
-
-def density_by_sigma(given: Given) -> DensityClasses:
-    """Density classes of sigma_1 over the runs with a result."""
-    return density_classes(_sigma(given))
-
-
-def agreement(given: Given) -> dict[str, Any]:
+def agreement(given: AnalysisInput) -> dict[str, Any]:
     """Triplets, SI (first of ``reduction.deltas``) and sigma_1 on the same runs and cells.
 
     Steady runs count as ordered. Runs count one by one in the confusion matrices; ``differing``
     lists the cells whose modal classes are not all equal.
     """
+    given.need_runs()
+    if not given.sweep.reduction.deltas:
+        raise BadInput("reduction.deltas is needed")
     triplet = ["ordered" if n == STEADY else n for n in given.own_names()]
     scale = unit_of(given, given.sweep.reduction.delta_unit)
     delta = given.sweep.reduction.deltas[0]
     strength = _strength(given.local_sigma(), scale, delta)
     by_strength: list[str | None] = list(classes_by_incoherence(np.nan_to_num(strength)))
-    density = density_by_sigma(given)
+    density = density_classes(np.where(given.has_result, given.scalars["sigma_1"], np.nan))
     by_density = [density.names[k] if k >= 0 else None for k in density.labels]
     methods = {"triplets": triplet, "SI": by_strength, "sigma_1": by_density}
     for names in methods.values():
@@ -180,8 +173,7 @@ def _pair(
     }
 
 
-def _modal(given: Given, verdicts: Sequence[str | None]) -> list[str | None]:
+def _modal(given: AnalysisInput, verdicts: Sequence[str | None]) -> list[str | None]:
     return [
-        most_frequent(Counter(verdicts[run] for run in _runs(given, i)))
-        for i in range(given.n_cells)
+        most_frequent(Counter(verdicts[run] for run in given.runs(i))) for i in range(given.n_cells)
     ]

@@ -12,20 +12,20 @@ from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.classify.robustness import fraction_curve
-from chimera_hpc.reduction.analyses.given import Given
+from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 _ORDER = (*CLASSES, STEADY, NO_WINDOW)
 
 
-def atlas(given: Given) -> dict[str, Any]:
+def atlas(given: AnalysisInput) -> dict[str, Any]:
     """Every run judged by each atlas; the first one's classes as a background.
 
     For each cell: votes, modal class (over all runs with a result; ties go to the earlier of
     ordered, chimera, disordered), the mean triplet of the runs of the modal class, and their mean
     distance to the nearest training point.
     """
+    first = given.need_atlas()
     judges = {name: _judged_cells(given, judge) for name, judge in given.atlases.items()}
-    first = next(iter(given.atlases.values()))
     span = first.scaler[1] - first.scaler[0]
     background = {
         "triplets": first.points * np.where(span > 0.0, span, 1.0) + first.scaler[0],
@@ -35,11 +35,11 @@ def atlas(given: Given) -> dict[str, Any]:
     return {"judges": judges, "background": background}
 
 
-def _judged_cells(given: Given, judge: Atlas) -> list[dict[str, Any]]:
+def _judged_cells(given: AnalysisInput, judge: Atlas) -> list[dict[str, Any]]:
     names, distance = given.judged_names(judge), judge.classify(given.triplets).distance
     found = []
     for i in range(given.n_cells):
-        runs = np.flatnonzero((given.cell == i) & given.has_result)
+        runs = given.runs(i)
         votes = Counter(names[run] for run in runs)
         modal = most_frequent(votes)
         chosen = [run for run in runs if names[run] == modal]
@@ -61,8 +61,9 @@ def most_frequent(votes: Counter[Any]) -> str | None:
     return max((n for n in _ORDER if votes[n]), key=lambda name: votes[name], default=None)
 
 
-def robustness(given: Given) -> dict[str, Any]:
+def robustness(given: AnalysisInput) -> dict[str, Any]:
     """W: share of chimeras by each atlas against the number of reversed links (ratio-o1-o2)."""
+    given.need_atlas()
     flips = given.points.columns["flips"]
     curves = {}
     for name, judge in given.atlases.items():
@@ -89,7 +90,7 @@ def robustness(given: Given) -> dict[str, Any]:
     }
 
 
-def _label(given: Given) -> str:
+def _label(given: AnalysisInput) -> str:
     row = given.points.row(0)
     label = f"orientation {row['orientation']}"
     if row["flip_set"] == 1:

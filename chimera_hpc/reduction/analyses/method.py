@@ -7,12 +7,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.measures.fourier import fourier_features
-from chimera_hpc.measures.synthetic import synthetic_profiles, synthetic_signal
+from chimera_hpc.measures.synthetic import profile_error, synthetic_profiles, synthetic_signal
 from chimera_hpc.measures.windows import maxima, windows
-from chimera_hpc.reduction.analyses.given import Given
+from chimera_hpc.reduction.analysis_input import AnalysisInput
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.reduction.selection import find_point
 
@@ -21,8 +22,9 @@ _REFINES: tuple[Literal["parabola", "sine-fit"], ...] = ("parabola", "sine-fit")
 _LEVELS = (0.0, 2.5, 25.0, 50.0, 75.0, 97.5, 100.0)
 
 
-def variations(given: Given) -> dict[str, Any]:
+def variations(given: AnalysisInput) -> dict[str, Any]:
     """Quantiles of V_theta, V_a, V_Omega and sigma_1 over the oscillating runs of each cell."""
+    given.need_runs()
     names = (*TRIPLET, "sigma_1")
     rows = []
     for i in range(given.n_cells):
@@ -34,7 +36,7 @@ def variations(given: Given) -> dict[str, Any]:
     return {"levels": _LEVELS, "cells": rows}
 
 
-def synthetic(given: Given) -> dict[str, Any]:
+def synthetic(given: AnalysisInput) -> dict[str, Any]:
     """Known profiles against those found on [500, 1000] (fig:FFT), by two ways to refine.
 
     Absolute time: the phase is that of the signal at t = 0, as eq:syntsig has it.
@@ -47,7 +49,9 @@ def synthetic(given: Given) -> dict[str, Any]:
         made = fourier_features(t, u, refine=refine, clock="own", time_origin="absolute")
         found[refine] = {name: getattr(made, name) for name in truth}
         errors[refine] = {
-            name: float(np.abs(_error(truth[name], found[refine][name], name == "phase")).max())
+            name: float(
+                np.abs(profile_error(truth[name], found[refine][name], name == "phase")).max()
+            )
             for name in truth
         }
     shown = t >= 990.0
@@ -59,21 +63,21 @@ def synthetic(given: Given) -> dict[str, Any]:
     }
 
 
-def _error(true: Array, found: Array, periodic: bool) -> Array:
-    error = true - found
-    return (error + np.pi) % (2.0 * np.pi) - np.pi if periodic else error
-
-
-def spectrum(given: Given) -> dict[str, Any]:
+def spectrum(given: AnalysisInput) -> dict[str, Any]:
     """First window of node 1 of a chimera: samples and amplitude spectrum (paper fig:FFTsign).
 
     The run is the second of ``reduction.show``. The window runs from a maximum to the ninth after
     it, both ends included, without padding or taper.
     """
-    assert given.series is not None
+    given.need_runs()
     selections = given.sweep.reduction.show
-    run = find_point(given.points, parse_selection(selections[min(1, len(selections) - 1)]))
-    assert run is not None
+    if not selections:
+        raise BadInput("reduction.show names no run")
+    assert given.series is not None
+    text = selections[min(1, len(selections) - 1)]
+    run = find_point(given.points, parse_selection(text))
+    if run is None:
+        raise BadInput(f"{text} is not in this sweep")
     t, u = given.series(run)
     y = np.ascontiguousarray(u[:, 0])
     first, last = windows(maxima(y), given.sweep.features.n_peaks, given.sweep.features.n_share)

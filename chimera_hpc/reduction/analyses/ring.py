@@ -11,10 +11,10 @@ from chimera_hpc.classify import stability as linear
 from chimera_hpc.classify.basin import basin_map
 from chimera_hpc.classify.robustness import wilson_interval
 from chimera_hpc.network.topology import Topology
-from chimera_hpc.reduction.analyses.given import Given
+from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 
-def networks(given: Given) -> dict[str, Any]:
+def networks(given: AnalysisInput) -> dict[str, Any]:
     """Links of the ring of each cell (paper fig:orient, fig:orient:3), and of the plain ring."""
     panels = []
     for i in range(given.n_cells):
@@ -33,7 +33,7 @@ def networks(given: Given) -> dict[str, Any]:
     return {"n_nodes": given.sweep.n_nodes, "panels": panels}
 
 
-def stability(given: Given) -> dict[str, Any]:
+def stability(given: AnalysisInput) -> dict[str, Any]:
     """Equilibria u* = 0, +sqrt 3, -sqrt 3: leading eigenvalue, block formula against full Jacobian.
 
     For each cell: the residual of the equilibrium, the largest real part by the blocks and by the
@@ -72,7 +72,7 @@ def stability(given: Given) -> dict[str, Any]:
     }
 
 
-def basin(given: Given) -> dict[str, Any]:
+def basin(given: AnalysisInput) -> dict[str, Any]:
     """f(P, R): share of runs whose last state is inside the ball they began in (fig:stability)."""
     columns = given.points.columns
     inside = given.scalars["distance"] <= columns["delta"]
@@ -95,7 +95,7 @@ def _last_above(radius: Any, fraction: Any, level: float) -> list[float]:
     ]
 
 
-def oscillation(given: Given) -> dict[str, Any]:
+def oscillation(given: AnalysisInput) -> dict[str, Any]:
     """Runs of each cell that oscillate, move without oscillating, and rest (sec:moredetdyn).
 
     ``oscillating``: ten maxima fit into the analysis, so the Fourier method can be applied.

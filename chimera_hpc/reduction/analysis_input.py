@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.classification import Classification, Cut
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Given:
+class AnalysisInput:
     """A finished sweep; n points in n_cells cells."""
 
     sweep: Sweep
@@ -63,21 +64,37 @@ class Given:
         """Number of cells."""
         return len(next(iter(self.cells.values())))
 
+    def runs(self, cell: int) -> NDArray[np.int64]:
+        """Return the points of a cell that have a result, in order."""
+        return np.flatnonzero((self.cell == cell) & self.has_result)
+
     def place(self, cell: int) -> dict[str, Any]:
-        """Coordinates of a cell."""
+        """Return the coordinates of a cell."""
         return {name: column[cell].item() for name, column in self.cells.items()}
 
     def local_sigma(self) -> Array:
-        """Local deviations sigma(m), shape (n, groups)."""
+        """Return the local deviations sigma(m), shape (n, groups)."""
         groups = self.sweep.features.groups
         return np.stack([self.scalars[f"local_sigma_{m + 1}"] for m in range(groups)], axis=1)
 
+    def need_runs(self) -> None:
+        """Raise BadInput unless two points have a result."""
+        if self.has_result.sum() < 2:
+            raise BadInput("too few runs yet")
+
+    def need_atlas(self) -> Atlas:
+        """Return the atlas that judges; raise BadInput when there is none."""
+        if not self.atlases:
+            text = "no atlas: reduction.atlas names a sweep that has been reduced"
+            raise BadInput(text)
+        return next(iter(self.atlases.values()))
+
     def own_names(self) -> list[str | None]:
-        """Class of each run by the sweep's own tree; ``steady``, ``no_window``, None as well."""
+        """Return the class of each run by the sweep's own tree: also steady, no_window or None."""
         return run_names(self.cut.labels, self.status, self.cut.names)
 
     def judged_names(self, atlas: Atlas) -> list[str | None]:
-        """Class of each run by an atlas; ``steady``, ``no_window``, None as well."""
+        """Return the class of each run by an atlas: also steady, no_window or None."""
         names: list[str | None] = list(atlas.classify(self.triplets).name)
         others = {Status.STEADY: STEADY, Status.NO_WINDOW: NO_WINDOW}
         return [

@@ -19,7 +19,7 @@ _PERIODS = 12
 
 
 @dataclass(frozen=True)
-class Run:
+class DrawnRun:
     """One run to draw."""
 
     place: str
@@ -30,7 +30,7 @@ class Run:
     """(T, N)"""
     class_name: str = ""
     features: Array | None = None
-    """(8, N) in the order of `features.FEATURES`; None where the run has none."""
+    """(8, N) in the order of `measures.fourier.FEATURES`; None where the run has none."""
     triplet: Array | None = None
     """(3,) V_theta, V_a, V_Omega; None where the run has none."""
 
@@ -54,12 +54,12 @@ class Run:
 
     @property
     def is_fast(self) -> bool:
-        """Whether twelve periods take less than half of the series: drawn whole, it blurs."""
+        """Whether twelve periods take less than half of the series, so that the whole blurs."""
         return self.close_up < 0.5 * float(self.t[-1] - self.t[0])
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FigureInput:
     """All that figures of a sweep are drawn from; n points in n_cells cells."""
 
     classification: Classification
@@ -73,7 +73,25 @@ class Outcome:
     """What analyses made, as in results.json."""
     beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """``curves`` of the sweeps that are drawn with this one, by their names."""
-    shown: Sequence[Run] = ()
+    shown: Sequence[DrawnRun] = ()
     """Runs over the analysis interval."""
-    whole: Sequence[Run] = ()
+    whole: Sequence[DrawnRun] = ()
     """Runs from t = 0 to the end."""
+
+    @property
+    def only_axis(self) -> tuple[str, NDArray[Any]] | None:
+        """The axis of a sweep that has one."""
+        return self.axes[0] if len(self.axes) == 1 else None
+
+    def classes(self, n_clusters: int) -> list[str | None]:
+        """Return the modal class of each cell (n_cells,) by a cut."""
+        return [cell["class"] for cell in self.cells[n_clusters]]
+
+    def votes(self, n_clusters: int) -> list[Mapping[str, int]]:
+        """Return the number of runs by class for each cell (n_cells,) by a cut."""
+        return [cell["votes"] for cell in self.cells[n_clusters]]
+
+
+def numbers(values: Any) -> Array:
+    """Return lists with None, which stands for NaN in results.json, as an array."""
+    return np.array(values, dtype=np.float64)
