@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jobs_for_tests import SMALL, job_text
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
@@ -22,23 +23,16 @@ from chimera_hpc.store.claims import ClaimLost, claim_block
 from chimera_hpc.store.schema import encode_series, scalar_labels, series_mask
 from chimera_hpc.store.store import Store
 
-JOB = """
-name = "small"
-model = "topological_fhn"
-[grid]
-P = "2:4"
-Q = "P"
-seeds = 5
-[fixed]
-n_nodes = 12
-[integrator]
-t_end = 20.0
-t_step = 0.5
-[features]
-start = 10.0
-[run]
-block = 4
-"""
+JOB = job_text(
+    SMALL,
+    {
+        "integrator.t_end": 20.0,
+        "integrator.t_step": 0.5,
+        "features.start": 10.0,
+        "features.n_peaks": None,
+        "features.n_share": None,
+    },
+)
 
 
 @dataclass

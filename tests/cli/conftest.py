@@ -7,28 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.sweep import main
 
-JOB = """
-name = "small"
-model = "topological_fhn"
-[grid]
-P = "2:4"
-Q = "P"
-seeds = 5
-[fixed]
-n_nodes = 12
-[integrator]
-t_end = 60.0
-t_step = 0.1
-[features]
-start = 30.0
-n_peaks = 3
-n_share = 1
-[run]
-block = 4
-"""
+JOB = job_text(SMALL)
 
 
 @pytest.fixture

@@ -3,17 +3,11 @@
 import os
 
 import pytest
+from jobs_for_tests import BARE, job_text
 
 from chimera_hpc.sweep import main
 
-JOB = """
-name = "bad"
-model = "topological_fhn"
-[grid]
-P = "2:4"
-Q = "P"
-seeds = 2
-"""
+JOB = job_text(BARE, {"name": "bad", "grid.seeds": 2})
 
 
 @pytest.fixture

@@ -9,31 +9,26 @@ import time
 import numpy as np
 import psutil
 import pytest
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
-JOB = """
-name = "bits"
-model = "topological_fhn"
-[grid]
-P = [2, 3]
-Q = "0:P"
-seeds = 10
-[fixed]
-n_nodes = 9
-[integrator]
-t_end = {t_end}
-[features]
-start = {start}
-groups = 3
-"""
+JOB = SMALL | {
+    "name": "bits",
+    "grid.P": [2, 3],
+    "grid.Q": "0:P",
+    "grid.seeds": 10,
+    "fixed.n_nodes": 9,
+    "features.groups": 3,
+    **dict.fromkeys(("integrator.t_step", "features.n_peaks", "features.n_share", "run.block")),
+}
 
 
 def write_job(folder, t_end=60.0, start=40.0):
     job = folder / "bits.toml"
-    job.write_text(JOB.format(t_end=t_end, start=start))
+    job.write_text(job_text(JOB, {"integrator.t_end": t_end, "features.start": start}))
     return job
 
 

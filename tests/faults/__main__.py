@@ -21,6 +21,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 from faults import FAULTS, Impossible
 from lab import JOB, Child, Finding, Point, Stuck, Trial, fork, read_points

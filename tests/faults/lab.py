@@ -21,26 +21,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-JOB = """
-name = "faults"
-model = "trouble:MODEL"
-[grid]
-P = "2:5"
-seeds = 8
-[integrator]
-t_end = 60.0
-t_step = 0.1
-time_out = 60.0
-[features]
-start = 30.0
-n_peaks = 3
-n_share = 1
-[reduction]
-cuts = [3]
-[run]
-block = 4
-patience = 30.0
-"""
+from jobs_for_tests import SMALL, job_text
+
+JOB = job_text(
+    SMALL,
+    {
+        "name": "faults",
+        "model": "trouble:MODEL",
+        "grid.P": "2:5",
+        "grid.Q": None,
+        "grid.seeds": 8,
+        "fixed.n_nodes": None,
+        "integrator.time_out": 60.0,
+        "reduction.cuts": [3],
+        "run.patience": 30.0,
+    },
+)
 N_POINTS, N_BLOCKS, BLOCK = 32, 8, 4
 PATIENCE = 30.0
 # First and last point of the sweep, and the last one of the sweep before it was extended.

@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from jobs_for_tests import BARE, job_text
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.selection import parse_selection, split_figure_name
 
-JOB = """
-name = "x"
-model = "topological_fhn"
-[grid]
-P = "2:24"
-Q = "P"
-[reduction]
-"""
+JOB = job_text(BARE, {"grid.P": "2:24"}) + "[reduction]\n"
 
 
 def test_selection_gives_integers_and_floats_by_name():

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.sweep import main
 
@@ -29,20 +30,17 @@ class Mine:
 
 MINE = Mine()
 """
-JOB = """
-name = "mine"
-model = "{model}"
-[grid]
-pull = [0.04, 0.05]
-seeds = 3
-[integrator]
-t_end = 30.0
-t_step = 0.1
-[features]
-start = 10.0
-n_peaks = 3
-n_share = 1
-"""
+JOB = SMALL | {
+    "name": "mine",
+    "grid.P": None,
+    "grid.Q": None,
+    "grid.pull": [0.04, 0.05],
+    "grid.seeds": 3,
+    "fixed.n_nodes": None,
+    "integrator.t_end": 30.0,
+    "features.start": 10.0,
+    "run.block": None,
+}
 numbers = itertools.count()
 
 
@@ -55,7 +53,7 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]
         module = f"own_model_{next(numbers)}"
         (tmp_path / f"{module}.py").write_text(text.replace("{extra}", extra))
         job = tmp_path / "job.toml"
-        job.write_text(JOB.format(model=f"{module}:{name}"))
+        job.write_text(job_text(JOB, {"model": f"{module}:{name}"}))
         return job
 
     return write
@@ -117,6 +115,6 @@ def test_names_that_lead_nowhere_are_refused(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     job = tmp_path / "job.toml"
-    job.write_text(JOB.format(model=model))
+    job.write_text(job_text(JOB, {"model": model}))
     assert main(["plan", str(job)]) == 2
     assert "model: " in capsys.readouterr().err

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.models.custom import OwnModel, Parameter
@@ -60,24 +61,22 @@ PARTS = {
     "initial": "rng.uniform(-1.0, 1.0, (2, n_nodes))",
     "options": "",
 }
-JOB = """
-name = "mine"
-model = "{module}:MODEL"
-[grid]
-omega = [5.0, 6.0]
-gain = [0.02, 0.05]
-seeds = 4
-[integrator]
-t_end = 20.0
-t_step = 0.02
-[features]
-start = 5.0
-n_peaks = 4
-n_share = 1
-groups = 2
-[reduction]
-show = ["omega=5 gain=0.02 seed=1"]
-"""
+JOB = SMALL | {
+    "name": "mine",
+    "grid.P": None,
+    "grid.Q": None,
+    "grid.omega": [5.0, 6.0],
+    "grid.gain": [0.02, 0.05],
+    "grid.seeds": 4,
+    "fixed.n_nodes": None,
+    "integrator.t_end": 20.0,
+    "integrator.t_step": 0.02,
+    "features.start": 5.0,
+    "features.n_peaks": 4,
+    "features.groups": 2,
+    "run.block": None,
+    "reduction.show": ["omega=5 gain=0.02 seed=1"],
+}
 
 
 def write(folder: Path, module: str, **parts: str) -> Path:
@@ -85,7 +84,7 @@ def write(folder: Path, module: str, **parts: str) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / f"{module}.py").write_text(MODULE.format(**PARTS | parts))
     job = folder / "job.toml"
-    job.write_text(JOB.format(module=module))
+    job.write_text(job_text(JOB, {"model": f"{module}:MODEL"}))
     return job
 
 
@@ -270,7 +269,7 @@ def test_missing_module_is_said_with_where_it_may_be(
     apart: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     job = tmp_path / "job.toml"
-    job.write_text(JOB.format(module="mine_missing"))
+    job.write_text(job_text(JOB, {"model": "mine_missing:MODEL"}))
     assert main(["plan", str(job)]) == 2
     error = capsys.readouterr().err
     assert "No module named 'mine_missing'" in error

@@ -15,29 +15,12 @@ from typing import Any
 
 import psutil
 import pytest
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.cli.main import main, needs_workers
 from chimera_hpc.run import fork_server
 
-JOB = """
-name = "small"
-model = "topological_fhn"
-[grid]
-P = "2:4"
-Q = "P"
-seeds = 20
-[fixed]
-n_nodes = 12
-[integrator]
-t_end = 4000.0
-t_step = 0.1
-[features]
-start = 3900.0
-n_peaks = 3
-n_share = 1
-[run]
-block = 4
-"""
+JOB = job_text(SMALL, {"grid.seeds": 20, "integrator.t_end": 4000.0, "features.start": 3900.0})
 LOOK = """
 import json, os, signal, sys
 from pathlib import Path

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jobs_for_tests import job_text
 from slurm_sweeps import JOB, write_job
 
 from chimera_hpc.base.errors import BadInput
@@ -25,7 +26,7 @@ from chimera_hpc.sweep import main
 
 
 def small() -> Sweep:
-    return Sweep.from_toml_text(JOB.format(t_end=100.0, block=4))
+    return Sweep.from_toml_text(job_text(JOB))
 
 
 def costs(sweep: Sweep) -> np.ndarray:
@@ -146,7 +147,7 @@ def test_wishes_that_are_none_are_refused_with_their_place(
 
 
 def test_an_unknown_key_of_the_jobs_table_is_refused_with_the_nearest_one() -> None:
-    text = JOB.format(t_end=100.0, block=4).replace("interface =", "interfaec =")
+    text = job_text(JOB).replace("interface =", "interfaec =")
     with pytest.raises(BadInput, match=r"slurm.interfaec: unknown key; did you mean interface\?"):
         Sweep.from_toml_text(text)
 
