@@ -52,7 +52,7 @@ def command(*words: object) -> list[str]:
     return [sys.executable, "-m", "chimera_hpc.sweep", *map(str, words)]
 
 
-def sweep(*words: object, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+def sweep(*words: object, timeout: float = 240) -> subprocess.CompletedProcess[str]:
     """Run a command of the sweep in a process of its own."""
     return subprocess.run(
         command(*words), capture_output=True, text=True, timeout=timeout, check=False

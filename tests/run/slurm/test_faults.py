@@ -17,7 +17,7 @@ from slurm_sweeps import LONG, command, digests, logs, n_done, rows_done, sweep,
 from chimera_hpc.run.slurm import tls
 from chimera_hpc.store.claims import live_claims
 
-pytestmark = pytest.mark.slurm
+pytestmark = [pytest.mark.slurm, pytest.mark.slow]
 
 WORKERS = 2
 
