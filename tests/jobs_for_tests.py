@@ -17,7 +17,7 @@ SMALL = BARE | {
     "integrator.t_step": 0.1,
     "features.start": 30.0,
     "features.n_peaks": 3,
-    "features.n_share": 1,
+    "features.n_overlap": 1,
     "run.block": 4,
 }
 """15 points of small rings in blocks of 4, each computed in milliseconds."""

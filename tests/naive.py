@@ -26,13 +26,13 @@ def maxima(x):
     return find_peaks(x)[0]
 
 
-def windows(peaks, n_peaks, n_share):
+def windows(peaks, n_peaks, n_overlap):
     """List of (first, last) samples, both included, of the windows over a list of maxima."""
     found = []
     first = 0
     while first + n_peaks <= len(peaks):
         found.append((peaks[first], peaks[first + n_peaks - 1]))
-        first += n_peaks - n_share
+        first += n_peaks - n_overlap
     return found
 
 
@@ -104,9 +104,9 @@ def fourier_features(
     t,
     u,
     n_peaks=10,
-    n_share=5,
-    clock="ring",
-    clock_node=0,
+    n_overlap=5,
+    window_reference="ring",
+    reference_node=0,
     phase_mean="circular",
     refine="parabola",
     time_origin="window",
@@ -114,10 +114,10 @@ def fourier_features(
     """Features (8, N) of an oscillating run with at least one window in each signal."""
     rows = []
     for x in u.T:
-        peaks = maxima(u[:, clock_node] if clock == "ring" else x)
+        peaks = maxima(u[:, reference_node] if window_reference == "ring" else x)
         values = [
             window_values(t, x, first, last, refine, time_origin)
-            for first, last in windows(peaks, n_peaks, n_share)
+            for first, last in windows(peaks, n_peaks, n_overlap)
         ]
         rows.append(averages(np.array(values), phase_mean))
     return np.array(rows).T

@@ -18,7 +18,7 @@ JOB = SMALL | {
     "integrator.t_end": 100.0,
     "features.start": 40.0,
     "features.n_peaks": None,
-    "features.n_share": None,
+    "features.n_overlap": None,
     "reduction.figures": [],
     "keep.series": "none",
     "run.patience": 20.0,

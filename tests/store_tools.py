@@ -30,7 +30,7 @@ JOB = job_text(
         "integrator.t_step": 0.5,
         "features.start": 10.0,
         "features.n_peaks": None,
-        "features.n_share": None,
+        "features.n_overlap": None,
     },
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,7 +58,7 @@ def add_block(parser: ArgumentParser) -> None:
 def add_out(parser: ArgumentParser) -> None:
     """Add the folder of a sweep that may not exist yet."""
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="the sweep's folder (default: results/NAME)"
+        "--out", type=folder_name, metavar="DIR", help="the sweep's folder (default: results/NAME)"
     )
 
 
@@ -199,6 +199,13 @@ def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> S
 
         check_selections(sweep, sweep.points())
     return sweep
+
+
+def folder_name(text: str) -> Path:
+    """Return the folder that an option names."""
+    if not text.strip():
+        raise ArgumentTypeError("empty; the name of a folder is needed")
+    return Path(text)
 
 
 def sweep_folder(out: Path | None, sweep: Sweep) -> Path:

@@ -12,6 +12,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
+from chimera_hpc.cli.arguments import folder_name
 
 if TYPE_CHECKING:
     from chimera_hpc.job.tables import Features
@@ -86,7 +87,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="figures (default: FILE-classified)"
+        "--out", type=folder_name, metavar="DIR", help="figures (default: FILE-classified)"
     )
     parser.add_argument("--no-figures", action="store_true", help="no figures")
 
@@ -314,7 +315,7 @@ def _draw(
     figures = {"space_time": space_time([(made.t, made.u)], [title], zoom=zoom)}
     if found.features.n_windows:
         figures["profiles"] = fourier_indicators([profiles_of(found.features.as_array())], [title])
-        node = settings.clock_node
+        node = settings.reference_node
         data, _ = window_spectrum(made.t, made.u, settings, node, 0)
         figures["spectrum"] = spectrum(data, f"{called(made.names[node])}, window 1")
     if judge is not None and found.verdict is not None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import gc
+import re
 import sys
+import warnings
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NoReturn
 
 from chimera_hpc import __version__
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.renaming import IS_RENAMING
 from chimera_hpc.run.fork_server import fork_server
 
 _EXITS = """exit status:
@@ -86,13 +90,33 @@ def _execute(typed: list[str]) -> int:
     args.typed = typed
     args.parser_named = parser
     try:
-        return int(args.execute(args))
+        with _plain_notes():
+            return int(args.execute(args))
     except BadInput as error:
         print(f"error: {error}", file=sys.stderr)
         return Exit.BAD_INPUT
     except BrokenPipeError:
         sys.stderr.close()
         return Exit.COMPLETE
+
+
+@contextmanager
+def _plain_notes() -> Iterator[None]:
+    """Show that something was renamed as one line, as long as the command runs."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("always", message=IS_RENAMING, category=FutureWarning)
+        before: Any = warnings.showwarning
+        said: set[str] = set()
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+            if not re.match(IS_RENAMING, str(message)):
+                before(message, category, *rest, **named)
+            elif str(message) not in said:
+                said.add(str(message))
+                print(f"note: {message}", file=sys.stderr)
+
+        warnings.showwarning = show
+        yield
 
 
 def run() -> NoReturn:

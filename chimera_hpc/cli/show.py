@@ -11,7 +11,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add_folder, add_point, find_points, store_path
+from chimera_hpc.cli.arguments import add_folder, add_point, find_points, folder_name, store_path
 from chimera_hpc.cli.ending import name_of
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ The run is integrated anew by the code that made the sweep, and what comes out i
 store bit for bit; exit status 1: it comes out otherwise. Values that select one cell and no seed
 show its seeds side by side, and the portrait and spectrum of the one that stands for them: of the
 most frequent class, nearest to the median of its variations. Nodes and windows count from 0 here,
-as features.clock_node does, and from 1 in figures.
+as features.reference_node does, and from 1 in figures.
 """
 _SIDE_BY_SIDE = 6
 """Most seeds of a cell that are drawn."""
@@ -43,13 +43,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_folder(parser)
     add_point(parser)
     parser.add_argument(
-        "--node", type=int, metavar="J", help="node of portrait and spectrum (default: the clock's)"
+        "--node",
+        type=int,
+        metavar="J",
+        help="node of portrait and spectrum (default: features.reference_node)",
     )
     parser.add_argument(
         "--window", type=int, default=0, metavar="K", help="window of the spectrum (default: 0)"
     )
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="where figures go (default: figures/show)"
+        "--out", type=folder_name, metavar="DIR", help="where figures go (default: figures/show)"
     )
     parser.add_argument(
         "--animate", type=Path, metavar="FILE", help="write the ring's motion, .gif or .mp4"
@@ -68,7 +71,7 @@ def execute(args: Namespace) -> int:
 
     store = Store.open(path)
     chosen = find_points(store, args.point)
-    node = store.sweep.features.clock_node if args.node is None else args.node
+    node = store.sweep.features.reference_node if args.node is None else args.node
     if not 0 <= node < store.sweep.n_nodes:
         raise BadInput(f"--node {node}: allowed is 0 to {store.sweep.n_nodes - 1}")
     _one_cell(store, chosen)

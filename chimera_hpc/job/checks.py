@@ -22,18 +22,34 @@ MAX_SAMPLES = 10**9
 """Most samples of one point's analysis."""
 
 
-def normal_grid(model: ModelParameters, grid: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the axes in normal form, `seeds` last (1 when missing); BadInput for a wrong axis."""
-    normal: dict[str, Any] = {}
-    for name, raw in grid.items():
-        if name == "n_nodes":
+class Grid(dict[str, Any]):
+    """The table [grid] in normal form, `seeds` last, with the axes that were read from it."""
+
+    parsed: Mapping[str, Axis]
+    """By the names of the table, names of other parameters not yet replaced."""
+
+    @classmethod
+    def of(cls, model: ModelParameters, raw: Mapping[str, Any]) -> Grid:
+        """Read every axis once; `seeds` is 1 when missing; BadInput for a wrong axis."""
+        if "n_nodes" in raw:
             raise BadInput("grid.n_nodes: one for a whole sweep; set it in [fixed]")
-        if name != "seeds":
-            normal[name] = normal_form(_parse(name, raw, axis_parameter(model, name)))
-    seeds = parse_seeds(grid.get("seeds", 1))
-    count = len(seeds.values)
-    is_count = normal_form(seeds) == normal_form(Values(range(count)))
-    return {**normal, "seeds": count if is_count else normal_form(seeds)}
+        parsed = {
+            name: _parse(name, value, axis_parameter(model, name))
+            for name, value in raw.items()
+            if name != "seeds"
+        }
+        seeds = parse_seeds(raw.get("seeds", 1))
+        grid = cls({name: normal_form(axis) for name, axis in parsed.items()})
+        count, normal = len(seeds.values), normal_form(seeds)
+        grid["seeds"] = count if normal == normal_form(Values(range(count))) else normal
+        grid.parsed = {**parsed, "seeds": seeds}
+        return grid
+
+
+def parsed(grid: Mapping[str, Any]) -> Mapping[str, Axis]:
+    """Return the axes of a validated table [grid]."""
+    assert isinstance(grid, Grid)
+    return grid.parsed
 
 
 def complete_fixed(
@@ -61,17 +77,17 @@ def complete_fixed(
     return complete
 
 
-def axes_of(model: ModelParameters, grid: Mapping[str, Any], fixed: Fixed) -> dict[str, Axis]:
+def axes_of(model: ModelParameters, grid: Mapping[str, Axis], fixed: Fixed) -> dict[str, Axis]:
     """Return the axes by the name of their column, names of fixed parameters replaced, `seed` last.
 
     Raises BadInput for a name that is neither an axis nor fixed, or not of the right type.
     """
     axes: dict[str, Axis] = {}
-    for name, raw in grid.items():
+    for name, read in grid.items():
         if name == "seeds":
             continue
         parameter = axis_parameter(model, name)
-        axis = _at(f"grid.{name}", resolve, _parse(name, raw, parameter), fixed, parameter)
+        axis = _at(f"grid.{name}", resolve, read, fixed, parameter)
         for other in references(axis):
             if other not in grid or other == "seeds":
                 known = [key for key in (*grid, *fixed) if key not in ("seeds", name)]
@@ -79,7 +95,7 @@ def axes_of(model: ModelParameters, grid: Mapping[str, Any], fixed: Fixed) -> di
             if parameter.kind is int and axis_parameter(model, other).kind is float:
                 raise BadInput(f"grid.{name}: must be integers, and {other} is not")
         axes[name] = axis
-    return {**axes, "seed": parse_seeds(grid["seeds"])}
+    return {**axes, "seed": grid["seeds"]}
 
 
 def axis_parameter(model: ModelParameters, name: str) -> Parameter:
@@ -153,9 +169,9 @@ def check_tables(
 
 def check_nodes(features: Features, n_nodes: int) -> None:
     """Raise BadInput for a node outside the ring, and for more groups than nodes."""
-    if features.clock_node >= n_nodes:
+    if features.reference_node >= n_nodes:
         text = f"is outside the ring, 0 to {n_nodes - 1} is allowed"
-        raise BadInput(f"features.clock_node: {features.clock_node} {text}")
+        raise BadInput(f"features.reference_node: {features.reference_node} {text}")
     if features.groups > n_nodes:
         raise BadInput(f"features.groups: {features.groups} is more than n_nodes = {n_nodes}")
 

@@ -11,8 +11,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from chimera_hpc.base import renaming
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import short
+from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.tables import TABLES, unknown_key
 
 _BARE = re.compile(r"[^\[{\"'\n\r=#]+")
@@ -47,33 +49,63 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 def apply_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
     """Return the data with each KEY=VALUE put in its place.
 
-    KEY is `table.key`, or a bare key: a parameter, which stays in [grid] when it is an axis and
-    goes there when the value is one (a list, a range, a name), else into [fixed]; `seeds`; or name,
-    title, model. VALUE is TOML, or bare text such as 3:8, P or sine-fit.
+    KEY is `table.key`, or a bare key: name, title, model; `seeds`; a parameter of the model; or a
+    key of exactly one other table. A parameter stays in [grid] if it is an axis and goes there if
+    the value is one (a list, a range, a name), else into [fixed]. VALUE is TOML, or bare text such
+    as 3:8, P or sine-fit.
     """
     changed = {key: dict(v) if isinstance(v, dict) else v for key, v in data.items()}
     for override in overrides:
         key, equals, text = override.partition("=")
         if not equals or not key.strip():
             raise bad(f"--set {short(override)}", "KEY=VALUE is needed")
-        _assign(changed, key.strip(), _parse_value(text.strip(), override), override)
+        table, name = _place(changed, key.strip(), override)
+        value = _parse_value(text.strip(), override)
+        if not table:
+            changed[name] = value
+        elif table == "grid" or (table == "fixed" and _is_axis(value)):
+            changed["grid"][name] = value
+            changed["fixed"].pop(name, None)
+        else:
+            changed[table][name] = value
     return changed
 
 
-def _assign(data: dict[str, Any], dotted: str, value: Any, override: str) -> None:
+def _is_axis(value: Any) -> bool:
+    return isinstance(value, str | list | dict)
+
+
+def _place(data: dict[str, Any], dotted: str, override: str) -> tuple[str, str]:
+    """Return the table, made if missing, and the key that an override means."""
     table, _, key = dotted.rpartition(".")
     if not table and key in _TOP:
-        data[key] = value
-        return
-    for name in {table or "grid", "grid", "fixed"}:
+        return "", key
+    for name in ("grid", "fixed", *([table] if table else [])):
         if not isinstance(data.setdefault(name, {}), dict):
             raise bad(f"--set {short(override)}", f"{name} is not a table")
-    if table in ("", "grid", "fixed"):
-        is_axis = isinstance(value, str | list | dict) or key == "seeds" or key in data["grid"]
-        table = "grid" if table == "grid" or is_axis else "fixed"
-        if table == "grid":
-            data["fixed"].pop(key, None)
-    data[table][key] = value
+    if not table:
+        table = _table_of(data, key)
+    if table == "features" and key in renaming.FEATURES:
+        new = renaming.FEATURES[key]
+        renaming.warn(f"features.{key}", f"features.{new}")
+        key = new
+    if table in ("", "fixed"):
+        table = "grid" if key == "seeds" or key in data["grid"] else "fixed"
+    data.setdefault(table, {})
+    return table, key
+
+
+def _table_of(data: Mapping[str, Any], key: str) -> str:
+    """Return the table besides [grid] and [fixed] that a bare key belongs to, or nothing."""
+    new = renaming.FEATURES.get(key, key)
+    homes = [name for name, table in TABLES.items() if new in table.model_fields]
+    if len(homes) != 1 or key in {*data["grid"], *data["fixed"], "delta"}:
+        return ""
+    try:
+        known = parameters_of(str(data.get("model", "")))
+    except BadInput:
+        return ""
+    return "" if known.find(key) else homes[0]
 
 
 def _parse_value(text: str, override: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from hashlib import blake2b
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -19,16 +20,18 @@ from pydantic import (
     model_validator,
 )
 
+from chimera_hpc.base import renaming
+from chimera_hpc.base.renaming import with_new_names
 from chimera_hpc.base.wording import short
 from chimera_hpc.job.axes import Axis, Values
 from chimera_hpc.job.checks import (
+    Grid,
     axes_of,
     check_nodes,
     check_points,
     check_tables,
     complete_fixed,
-    normal_grid,
-    parse_seeds,
+    parsed,
 )
 from chimera_hpc.job.models import look_in, parameters_of
 from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
@@ -38,6 +41,7 @@ from chimera_hpc.job.selection import check_names
 from chimera_hpc.job.tables import Features, Integrator, Keep, Line, Reduction, Run, Slurm, Table
 
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
+_OLD_NAMES = {new: old for old, new in renaming.FEATURES.items()}
 _DIGESTED = ("model", "grid", "fixed", "integrator", "features")
 
 
@@ -95,9 +99,10 @@ class Sweep(Table):
 
         The module of a user's model is looked for in `folder` too.
         """
-        data = apply_overrides(parse_toml(text, where), overrides)
-        if folder is not None and ":" in str(data.get("model", "")):
+        data = parse_toml(text, where)
+        if folder is not None:
             look_in(folder)
+        data = apply_overrides(_with_new_names(data, "features."), overrides)
         settings = "".join(f" --set {short(override)}" for override in overrides)
         return cls.from_dict(data, where=f"{where} with{settings}" if settings else where)
 
@@ -105,7 +110,7 @@ class Sweep(Table):
     def from_dict(cls, data: Any, where: str = "sweep") -> Self:
         """Return the sweep of plain data, such as `to_dict` gives; raise BadInput with one line."""
         try:
-            return cls.model_validate(data)
+            return cls.model_validate(_with_new_names(data))
         except ValidationError as error:
             raise bad(where, one_line(error, list(cls.model_fields))) from None
 
@@ -118,15 +123,17 @@ class Sweep(Table):
         """Nodes of the ring, N0."""
         return int(self.fixed["n_nodes"])
 
-    @property
+    @cached_property
     def axes(self) -> dict[str, Axis]:
         """Axes by the name of their column, in order of declaration, `seed` last."""
-        return axes_of(parameters_of(self.model), self.grid, self.fixed)
+        return axes_of(parameters_of(self.model), parsed(self.grid), self.fixed)
 
     @property
     def seeds(self) -> range | tuple[float, ...]:
         """Seeds in order; `keep.series = "first-seed"` means the first of them."""
-        return parse_seeds(self.grid["seeds"]).values
+        seeds = self.axes["seed"]
+        assert isinstance(seeds, Values)
+        return seeds.values
 
     @property
     def n_samples(self) -> int:
@@ -178,12 +185,10 @@ class Sweep(Table):
         parameters_of(model)
         return model
 
-    @field_validator("grid", mode="before")
+    @field_validator("grid")
     @classmethod
-    def _normalise_grid(cls, grid: Any, info: ValidationInfo) -> Any:
-        if not _is_table(grid) or "model" not in info.data:
-            return grid
-        return normal_grid(parameters_of(info.data["model"]), grid)
+    def _normalise_grid(cls, grid: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        return Grid.of(parameters_of(info.data["model"]), grid) if "model" in info.data else grid
 
     @field_validator("fixed", mode="before")
     @classmethod
@@ -208,9 +213,12 @@ class Sweep(Table):
 def spec_digest(spec: Mapping[str, Any]) -> str:
     """Return the digest of a sweep as `Sweep.to_dict` gave it.
 
-    Of one that an earlier version of the package stored, too: keys that came since do not enter.
+    Of one that an earlier version of the package stored, too: keys that came since do not enter,
+    and settings that were renamed enter under their old names.
     """
-    text = json.dumps(_digested(spec), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    data = _digested(spec)
+    data["features"] = {_OLD_NAMES.get(key, key): v for key, v in data["features"].items()}
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return blake2b(text.encode(), digest_size=8).hexdigest()
 
 
@@ -220,6 +228,14 @@ def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
         integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
         data["integrator"] = integrator
     return {**data, "order of axes": list(spec["grid"])}
+
+
+def _with_new_names(data: Any, where: str = "") -> Any:
+    """Return a job with settings under their new names; with `where`, warn of each old one."""
+    features = data.get("features") if isinstance(data, dict) else None
+    if not isinstance(features, dict):
+        return data
+    return {**data, "features": with_new_names(features, renaming.FEATURES, where)}
 
 
 def _is_table(value: Any) -> bool:

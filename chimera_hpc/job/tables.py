@@ -108,24 +108,27 @@ class Integrator(Table):
     ball: Literal["maximum", "euclidean"] = Field(
         "maximum", description="Norm of that ball; maximum: delta * U[-1, 1] for each variable."
     )
-    max_steps: Count = Field(10_000_000, description="Accepted and rejected steps a point.")
-    time_out: float = Field(600.0, gt=0, description="Seconds of wall time a point.")
+    max_steps: Count = Field(10_000_000, description="Accepted and rejected steps per point.")
+    time_out: float = Field(600.0, gt=0, description="Seconds of wall time per point.")
 
 
 class Features(Table):
     """How a series becomes features."""
 
     start: float = Field(
-        950.0, ge=0, description="Begin of the analysis; it ends at integrator.t_end."
+        950.0, ge=0, description="Start of the analysis; it ends at integrator.t_end."
     )
     n_peaks: int = Field(
         10, ge=3, le=10**6, description="Maxima of one window, both ends included."
     )
-    n_share: int = Field(5, ge=0, description="Maxima that consecutive windows share.")
-    clock: Literal["ring", "own"] = Field(
-        "ring", description="Windows by the maxima of one node for all, or by each node's own."
+    n_overlap: int = Field(5, ge=0, description="Maxima that consecutive windows share.")
+    window_reference: Literal["ring", "own"] = Field(
+        "ring",
+        description="Maxima that place the windows: those of one node for all, or each node's own.",
     )
-    clock_node: int = Field(0, ge=0, description="Node whose maxima are the clock of the ring.")
+    reference_node: int = Field(
+        0, ge=0, description="Node (from 0) whose maxima place the windows of all nodes."
+    )
     phase_mean: Literal["circular", "arithmetic"] = Field(
         "circular", description="Mean of the phases over windows."
     )
@@ -135,7 +138,7 @@ class Features(Table):
     time_origin: Literal["window", "absolute"] = Field(
         "window", description="Time at which a phase is read: the window's start, or 0."
     )
-    still: float = Field(
+    steady_threshold: float = Field(
         1e-2, ge=0, description="Mean standard deviation of u below which a run is steady."
     )
     groups: int = Field(
@@ -144,11 +147,15 @@ class Features(Table):
         description="Groups of nodes for the local deviations of the strength of incoherence.",
     )
 
+    def options(self) -> dict[str, Any]:
+        """Return the keyword arguments of `fourier_features` by name."""
+        return self.model_dump(exclude={"start", "groups"})
+
     @model_validator(mode="after")
-    def _check_share(self) -> Self:
-        if self.n_share >= self.n_peaks:
-            text = f"{self.n_share} must be below features.n_peaks = {self.n_peaks}"
-            raise BadInput(f"features.n_share: {text}")
+    def _check_overlap(self) -> Self:
+        if self.n_overlap >= self.n_peaks:
+            text = f"{self.n_overlap} must be below features.n_peaks = {self.n_peaks}"
+            raise BadInput(f"features.n_overlap: {text}")
         return self
 
 
@@ -176,8 +183,8 @@ class Reduction(Table):
     )
     replay: Annotated[Texts, BeforeValidator(check_selections("reduction.replay"))] = Field(
         (),
-        description="Points, of this sweep or not, to integrate anew and to draw from 0 to t_end; "
-        "values that are not named are those of the sweep's first point.",
+        description="Points, of this sweep or not, to integrate again and to draw from 0 to t_end; "
+        "values that are not given are those of the sweep's first point.",
     )
     figures: Annotated[str | Texts, BeforeValidator(check_figures)] = Field(
         "auto", description='"auto", all that fit, or a list of the names of figures.'
@@ -220,10 +227,10 @@ class Keep(Table):
 
 
 class Run(Table):
-    """How the points are worked through; not part of the digest."""
+    """How the points are computed; not part of the digest."""
 
-    block: int = Field(0, ge=0, le=10**8, description="Points a block; 0: chosen from the cost.")
-    workers: int = Field(0, ge=0, le=10**6, description="Worker processes; 0: one a core.")
+    block: int = Field(0, ge=0, le=10**8, description="Points per block; 0: chosen from the cost.")
+    workers: int = Field(0, ge=0, le=10**6, description="Worker processes; 0: one per core.")
     attempts: int = Field(2, ge=1, le=100, description="Tries of a point that fails.")
     tighten: float = Field(
         0.1, gt=0, le=1, description="Factor on rtol and atol at each further try."
@@ -237,7 +244,7 @@ class Run(Table):
 
 
 class Slurm(Table):
-    """Wishes for SLURM, passed on as they are; not part of the digest."""
+    """Options for SLURM, passed on unchanged; not part of the digest."""
 
     partition: Word | None = Field(None, description="Partition (--partition).")
     account: Word | None = Field(None, description="Account (--account).")
@@ -255,7 +262,7 @@ class Slurm(Table):
         None, description="Elements of the job array that run at a time, at most."
     )
     setup: Lines = Field((), description="Shell lines before the work: modules, environments.")
-    extra: Lines = Field((), description="Further options of sbatch, one a line.")
+    extra: Lines = Field((), description="Further options of sbatch, one per line.")
     interface: Word | None = Field(None, description="Network interface of scheduler and workers.")
 
 

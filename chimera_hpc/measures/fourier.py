@@ -21,13 +21,15 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chimera_hpc.base import renaming
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.renaming import accepts_old_names
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
 from chimera_hpc.measures.checks import Array, floats, integer, node_rows
 
-Clock = Literal["ring", "own"]
+WindowReference = Literal["ring", "own"]
 PhaseMean = Literal["circular", "arithmetic"]
 Refine = Literal["parabola", "sine-fit"]
 TimeOrigin = Literal["window", "absolute"]
@@ -50,14 +52,14 @@ class FourierFeatures:
     """
 
     amplitude: Array
-    frequency: Array  # cycles a unit of time
+    frequency: Array  # cycles per unit of time
     phase: Array  # rad, in [-pi, pi)
     baseline: Array
     amplitude_std: Array
     frequency_std: Array
     phase_std: Array  # rad
     baseline_std: Array
-    n_windows: int  # of each signal; with each signal's own clock, the least over the signals
+    n_windows: int  # of each signal; with window_reference "own", the least over the signals
     deviation: float  # mean over the signals of the standard deviation in time
     status: Status  # DONE, STEADY or NO_WINDOW
 
@@ -71,9 +73,9 @@ class WindowLines:
     """The lines of N signals in each of up to q windows, before any average.
 
     `amplitude`, `frequency`, `phase` and `baseline` have shape (N, q); `first` and `last` (samples,
-    both inside the window) and `counts` have one row a clock: 1 for the ring's clock, N for each
-    signal's own. Beyond a clock's count, values are NaN and samples 0. All but
-    `deviation` are empty unless `status` is DONE.
+    both inside the window) and `counts` have one row per reference signal: 1 for window_reference
+    "ring", N for "own". Beyond a row's count, values are NaN and samples 0. All but `deviation` are
+    empty unless `status` is DONE.
     """
 
     amplitude: Array
@@ -96,24 +98,25 @@ class _Recording:
     x: Array
 
 
+@accepts_old_names(renaming.FEATURES)
 def fourier_features(
     t: ArrayLike,
     u: ArrayLike,
     *,
     n_peaks: int = 10,
-    n_share: int = 5,
-    clock: Clock = "ring",
-    clock_node: int = 0,
+    n_overlap: int = 5,
+    window_reference: WindowReference = "ring",
+    reference_node: int = 0,
     phase_mean: PhaseMean = "circular",
     refine: Refine = "parabola",
     time_origin: TimeOrigin = "window",
-    still: float = 1e-2,
+    steady_threshold: float = 1e-2,
 ) -> FourierFeatures:
     r"""Mean amplitude, frequency, phase and baseline of each signal, and how much they vary.
 
-    Windows run from a maximum of the clock to its (n_peaks - 1)-th next maximum, both samples
-    included; two windows in a row share n_share maxima. With q windows and Z^(w) the value of a
-    quantity in window w (eq:averages, eq:stds),
+    A window runs from a maximum of the reference signal to its (n_peaks - 1)-th next maximum, both
+    samples included; consecutive windows share n_overlap maxima. With q windows and Z^(w) the value
+    of a quantity in window w (eq:averages, eq:stds),
 
         <Z> = sum_w Z^(w) / q ,        sigma_Z^2 = sum_w (Z^(w) - <Z>)^2 / (q - 1) .
 
@@ -123,13 +126,14 @@ def fourier_features(
         Times, uniform.
     u : array_like, shape (T, N)
         Signals of any model or experiment. An array whose transpose is contiguous is not copied.
-    n_peaks, n_share : int
-        Maxima in a window (at least 3), and maxima shared by two windows in a row
-        (0 <= n_share < n_peaks).
-    clock : {"ring", "own"}
-        Whose maxima make the windows: those of `clock_node` for all signals, or each signal's own.
-    clock_node : int
-        Column of u (0-based) that is the ring's clock; without effect on the clock "own".
+    n_peaks, n_overlap : int
+        Maxima in a window (at least 3), and maxima shared by consecutive windows
+        (0 <= n_overlap < n_peaks).
+    window_reference : {"ring", "own"}
+        The signal whose maxima place the windows: that of `reference_node` for all signals
+        ("ring"), or each signal itself ("own").
+    reference_node : int
+        Column of u (0-based) of the reference signal; without effect on "own".
     phase_mean : {"circular", "arithmetic"}
         Circular: <theta> = arg sum_w exp(i theta^(w)), and the deviations from it are taken
         around the circle, in [-pi, pi), before they are squared. Arithmetic: the two formulas
@@ -142,15 +146,15 @@ def fourier_features(
         Phase at the window's first sample, or at t = 0 (for the start of the recording pass
         t - t[0]). An absolute phase carries the error of the frequency times 2 pi t: only the
         sine fit makes it useful far from t = 0.
-    still : float
-        Limit for the mean over signals of the standard deviation in time of u.
+    steady_threshold : float
+        Limit for the mean over signals of the standard deviation in time of u, in the unit of u.
 
     Returns
     -------
     FourierFeatures
-        Status STEADY where u varies less than `still`, else NO_WINDOW where a clock has fewer
-        than n_peaks maxima (with the clock "own": where any signal has), else DONE. Signals that
-        stand still among others that do not have amplitude, frequency and phase 0.
+        Status STEADY if u varies less than `steady_threshold`, else NO_WINDOW if the reference
+        signal has fewer than n_peaks maxima (with "own": if any signal has), else DONE. Constant
+        signals among oscillating ones have amplitude, frequency and phase 0.
 
     Raises
     ------
@@ -175,12 +179,12 @@ def fourier_features(
         t,
         u,
         n_peaks=n_peaks,
-        n_share=n_share,
-        clock=clock,
-        clock_node=clock_node,
+        n_overlap=n_overlap,
+        window_reference=window_reference,
+        reference_node=reference_node,
         refine=refine,
         time_origin=time_origin,
-        still=still,
+        steady_threshold=steady_threshold,
     )
     out = np.full((len(FEATURES), found.amplitude.shape[0]), np.nan)
     n_windows = 0
@@ -194,33 +198,35 @@ def fourier_features(
     )
 
 
+@accepts_old_names(renaming.FEATURES)
 def window_lines(
     t: ArrayLike,
     u: ArrayLike,
     *,
     n_peaks: int = 10,
-    n_share: int = 5,
-    clock: Clock = "ring",
-    clock_node: int = 0,
+    n_overlap: int = 5,
+    window_reference: WindowReference = "ring",
+    reference_node: int = 0,
     refine: Refine = "parabola",
     time_origin: TimeOrigin = "window",
-    still: float = 1e-2,
+    steady_threshold: float = 1e-2,
 ) -> WindowLines:
     """Lines of all signals in all windows; parameters and errors as for `fourier_features`."""
     recording = _recording(t, u)
     n_nodes = recording.x.shape[0]
-    n_peaks, n_share = _check_windows(n_peaks, n_share)
-    clock_node = _check_node(clock_node, n_nodes)
-    _check_choice("clock", clock, get_args(Clock))
+    n_peaks, n_overlap = _check_windows(n_peaks, n_overlap)
+    reference_node = _check_node(reference_node, n_nodes)
+    _check_choice("window_reference", window_reference, get_args(WindowReference))
     _check_choice("refine", refine, get_args(Refine))
     _check_choice("time_origin", time_origin, get_args(TimeOrigin))
-    _check_still(still)
+    _check_threshold(steady_threshold)
 
     deviation = _mean_deviation(recording.x)
-    if deviation < still:
+    if deviation < steady_threshold:
         return _no_lines(n_nodes, deviation, Status.STEADY)
-    clocks = recording.x if clock == "own" else recording.x[clock_node : clock_node + 1]
-    first, last, counts = _place_windows(clocks, n_peaks, n_share)
+    own = window_reference == "own"
+    placing = recording.x if own else recording.x[reference_node : reference_node + 1]
+    first, last, counts = _place_windows(placing, n_peaks, n_overlap)
     if counts.min() == 0:
         return _no_lines(n_nodes, deviation, Status.NO_WINDOW)
     table = np.full((n_nodes, first.shape[1], len(QUANTITIES)), np.nan)
@@ -234,7 +240,7 @@ def window_lines(
     values[_PHASE] = wrap(values[_PHASE])
     amplitude, frequency, phase, baseline = values
     return WindowLines(
-        *(amplitude, frequency, phase, baseline, first, last, counts, deviation, Status.DONE)
+        amplitude, frequency, phase, baseline, first, last, counts, deviation, Status.DONE
     )
 
 
@@ -252,10 +258,10 @@ def _no_lines(n_nodes: int, deviation: float, status: Status) -> WindowLines:
 
 
 def _place_windows(
-    clocks: Array, n_peaks: int, n_share: int
+    references: Array, n_peaks: int, n_overlap: int
 ) -> tuple[windows.Samples, windows.Samples, windows.Samples]:
-    """First and last samples (C, q) of the windows of C clocks (C, T), and their counts (C,)."""
-    placed = [windows.windows(windows.maxima(x), n_peaks, n_share) for x in clocks]
+    """First and last samples (C, q) of the windows of C signals (C, T), and their counts (C,)."""
+    placed = [windows.windows(windows.maxima(x), n_peaks, n_overlap) for x in references]
     counts = np.array([last.size for _, last in placed])
     first = np.zeros((len(placed), counts.max()), dtype=np.int64)
     last = np.zeros_like(first)
@@ -368,20 +374,20 @@ def _mean_deviation(x: Array) -> float:
     return float(deviations.mean())
 
 
-def _check_windows(n_peaks: int, n_share: int) -> tuple[int, int]:
-    n_peaks, n_share = integer("n_peaks", n_peaks), integer("n_share", n_share)
+def _check_windows(n_peaks: int, n_overlap: int) -> tuple[int, int]:
+    n_peaks, n_overlap = integer("n_peaks", n_peaks), integer("n_overlap", n_overlap)
     if n_peaks < 3:
         raise BadInput(f"n_peaks must be at least 3, not {n_peaks}")
-    if not 0 <= n_share < n_peaks:
-        raise BadInput(f"n_share must be in 0 .. n_peaks - 1 = {n_peaks - 1}, not {n_share}")
-    return n_peaks, n_share
+    if not 0 <= n_overlap < n_peaks:
+        raise BadInput(f"n_overlap must be in 0 .. n_peaks - 1 = {n_peaks - 1}, not {n_overlap}")
+    return n_peaks, n_overlap
 
 
-def _check_node(clock_node: int, n_nodes: int) -> int:
-    clock_node = integer("clock_node", clock_node)
-    if not 0 <= clock_node < n_nodes:
-        raise BadInput(f"clock_node must be in 0 .. {n_nodes - 1}, not {clock_node}")
-    return clock_node
+def _check_node(reference_node: int, n_nodes: int) -> int:
+    reference_node = integer("reference_node", reference_node)
+    if not 0 <= reference_node < n_nodes:
+        raise BadInput(f"reference_node must be in 0 .. {n_nodes - 1}, not {reference_node}")
+    return reference_node
 
 
 def _check_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
@@ -389,9 +395,9 @@ def _check_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
         raise BadInput(f"{name} must be one of {', '.join(allowed)}, not {value!r}")
 
 
-def _check_still(still: float) -> None:
-    if not 0.0 <= still < math.inf:
-        raise BadInput(f"still must be a finite number >= 0, not {still}")
+def _check_threshold(threshold: float) -> None:
+    if not 0.0 <= threshold < math.inf:
+        raise BadInput(f"steady_threshold must be a finite number >= 0, not {threshold}")
 
 
 assert tuple(f.name for f in fields(FourierFeatures))[: len(FEATURES)] == FEATURES

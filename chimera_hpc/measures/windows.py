@@ -1,7 +1,7 @@
 """Time windows that follow the signal: they begin and end at its maxima.
 
 A window runs from a maximum to the (n_peaks - 1)-th maximum after it, both samples included, so
-it holds n_peaks maxima and n_peaks - 1 periods; two windows in a row share n_share maxima.
+it holds n_peaks maxima and n_peaks - 1 periods; consecutive windows share n_overlap maxima.
 """
 
 from __future__ import annotations
@@ -59,15 +59,15 @@ def maxima(x: NDArray[np.float64]) -> Samples:
     return found[: _find_maxima(x, found)]
 
 
-def windows(peaks: Samples, n_peaks: int, n_share: int) -> tuple[Samples, Samples]:
+def windows(peaks: Samples, n_peaks: int, n_overlap: int) -> tuple[Samples, Samples]:
     """First and last sample of each complete window over a list of maxima.
 
     Parameters
     ----------
     peaks : ndarray of int64
         Places of the maxima, rising.
-    n_peaks, n_share : int
-        Maxima in a window, and maxima that two windows in a row share; 0 <= n_share < n_peaks.
+    n_peaks, n_overlap : int
+        Maxima in a window, and maxima that consecutive windows share; 0 <= n_overlap < n_peaks.
 
     Returns
     -------
@@ -76,9 +76,9 @@ def windows(peaks: Samples, n_peaks: int, n_share: int) -> tuple[Samples, Sample
 
     Examples
     --------
-    >>> windows(np.array([10, 20, 30, 40, 50, 60]), n_peaks=3, n_share=1)
+    >>> windows(np.array([10, 20, 30, 40, 50, 60]), n_peaks=3, n_overlap=1)
     (array([10, 30]), array([30, 50]))
     """
-    step = n_peaks - n_share
+    step = n_peaks - n_overlap
     last = peaks[n_peaks - 1 :: step]
     return peaks[::step][: last.size], last

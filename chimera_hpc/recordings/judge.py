@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,9 +148,7 @@ def measure(made: Prepared, settings: Features, ring: bool, judge: Judge | None)
 
 def features_of(made: Prepared, settings: Features) -> FourierFeatures:
     """Return the Fourier features of a prepared recording."""
-    names = set(Features.model_fields) - {"start", "groups"}
-    options: dict[str, Any] = {name: getattr(settings, name) for name in names}
-    return fourier_features(made.t, made.u, **options)
+    return fourier_features(made.t, made.u, **settings.options())
 
 
 def verdict_of(atlas: Atlas, triplet: Array) -> Verdict:
@@ -188,7 +185,7 @@ def _noise(made: Prepared, settings: Features, features: FourierFeatures) -> lis
     """Return a line where the clock has many more maxima than turns: windows follow them."""
     if features.status is not Status.DONE:
         return []
-    node = settings.clock_node
+    node = settings.reference_node
     count = len(maxima(np.ascontiguousarray(made.u[:, node])))
     turns = float(features.frequency[node] * (made.t[-1] - made.t[0]))
     if count <= _MAXIMA * turns + 1.0:

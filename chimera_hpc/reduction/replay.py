@@ -164,13 +164,14 @@ def window_spectrum(
     """
     if not 0 <= node < u.shape[1]:
         raise BadInput(f"--node {node}: allowed is 0 to {u.shape[1] - 1}")
-    names = ("n_peaks", "n_share", "clock", "clock_node", "refine", "time_origin", "still")
-    lines = window_lines(t, u, **{name: getattr(settings, name) for name in names})
-    clock = node if settings.clock == "own" else 0
-    count = int(lines.counts[clock])
+    options = settings.options()
+    del options["phase_mean"]
+    lines = window_lines(t, u, **options)
+    row = node if settings.window_reference == "own" else 0
+    count = int(lines.counts[row])
     if not 0 <= window < count:
         raise BadInput(f"--window {window}: allowed is 0 to {count - 1}")
-    part = slice(int(lines.first[clock, window]), int(lines.last[clock, window]) + 1)
+    part = slice(int(lines.first[row, window]), int(lines.last[row, window]) + 1)
     y, place = u[part, node], (node, window)
     samples = y - y.mean()
     amplitude = 2.0 / len(y) * np.abs(np.fft.rfft(samples))

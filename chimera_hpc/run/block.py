@@ -118,6 +118,7 @@ class _Block:
         self.initial = [
             initial_state(sweep, row, model) for row, model in zip(rows, self.models, strict=True)
         ]
+        self.options = sweep.features.options()
         self.keeps = series_mask(sweep, points.columns["seed"])
         self.result = empty_result(sweep, n)
         # Of the run being measured: u as stored, u and w node by node.
@@ -190,19 +191,7 @@ class _Block:
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
 
     def features(self, u: Array) -> FourierFeatures:
-        spec = self.sweep.features
-        return fourier_features(
-            self.times,
-            u.T,
-            n_peaks=spec.n_peaks,
-            n_share=spec.n_share,
-            clock=spec.clock,
-            clock_node=spec.clock_node,
-            phase_mean=spec.phase_mean,
-            refine=spec.refine,
-            time_origin=spec.time_origin,
-            still=spec.still,
-        )
+        return fourier_features(self.times, u.T, **self.options)
 
     def scalars(
         self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
@@ -252,7 +241,7 @@ def _warm_up_the_rest(sweep: Sweep, model: Model) -> None:
     t = 0.01 * np.arange(2000.0)
     rows = np.sin(2.0 * np.pi * t + np.arange(3.0)[:, None])
     spec = sweep.features
-    fourier_features(t, rows.T, clock=spec.clock, refine=spec.refine)
+    fourier_features(t, rows.T, window_reference=spec.window_reference, refine=spec.refine)
     order_parameter(rows.T, rows.T)
     local_sigma(rows.T, 1)
     # In the integrator's order: time by time.

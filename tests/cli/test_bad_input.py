@@ -45,7 +45,7 @@ def refused(arguments, capsys):
         ('reduction.show=["sigma=0.1"]', ["reduction.show", "sigma"]),
         ('reduction.replay=["P=3 Q=9"]', ["reduction.replay", "Q"]),
         ("features.start=-1", ["features.start"]),
-        ("features.n_share=10", ["n_share", "n_peaks"]),
+        ("features.n_overlap=10", ["n_overlap", "n_peaks"]),
         ("integrator.rtol=nan", ["rtol"]),
         ("integrator.method=rk4", ["method", "tsit5"]),
         ("keep.series=some", ["series", "first-seed"]),

@@ -22,7 +22,7 @@ JOB = SMALL | {
     "grid.seeds": 10,
     "fixed.n_nodes": 9,
     "features.groups": 3,
-    **dict.fromkeys(("integrator.t_step", "features.n_peaks", "features.n_share", "run.block")),
+    **dict.fromkeys(("integrator.t_step", "features.n_peaks", "features.n_overlap", "run.block")),
 }
 
 

@@ -175,6 +175,6 @@ def test_spectrum_is_that_of_the_window_that_the_features_come_from(store: Store
         fitted = window_spectrum(t, u, refined, node=1, window=1)[0]
         assert np.asarray(fitted.fit) == pytest.approx(np.asarray(fitted.y), abs=1e-6)
     assert "node 1, window 0 of" in text
-    names = ("n_peaks", "n_share", "clock", "clock_node")
+    names = ("n_peaks", "n_overlap", "window_reference", "reference_node")
     features = fourier_features(t, u, **{name: getattr(settings, name) for name in names})
     assert features.frequency[1] == pytest.approx(vertex(data)[0], rel=1e-6)

@@ -142,9 +142,9 @@ OTHER = {
         "time_out": 1.0,
     },
     "features": {
-        "start": 900, "n_peaks": 11, "n_share": 4, "clock": "own", "clock_node": 1,
-        "phase_mean": "arithmetic", "refine": "sine-fit", "time_origin": "absolute", "still": 0.1,
-        "groups": 5,
+        "start": 900, "n_peaks": 11, "n_overlap": 4, "window_reference": "own", "reference_node": 1,
+        "phase_mean": "arithmetic", "refine": "sine-fit", "time_origin": "absolute",
+        "steady_threshold": 0.1, "groups": 5,
     },
     "fixed": {"n_nodes": 51, "orientation": 2, "epsilon": 0.1, "b": 1, "c": -1, "flips": 1},
     "grid": {"P": "2:23", "Q": "0:P", "seeds": 19},
@@ -173,7 +173,7 @@ def test_the_changes_tried_are_all_digested_keys():
         ("P=3:24", "grid.P: 3:24 here, 2:24 in the store"),
         ("seeds=[5,7]", "grid.seeds: [5, 7] here, 20 in the store"),
         ("b=0.75", "fixed.b: 0.75 here, 0.5 in the store"),
-        ("features.clock=own", "features.clock: own here, ring in the store"),
+        ("features.window_reference=own", "features.window_reference: own here, ring in the store"),
     ],
 )
 def test_a_difference_is_explained_in_one_line(change, line):

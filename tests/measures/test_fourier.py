@@ -45,8 +45,8 @@ def test_a_window_is_ten_maxima_and_nine_periods_with_both_ends():
     assert 0 < abs(found.frequency[0, 0] - 9 / 2.27) < 0.5 / 2.27
 
 
-def test_windows_in_a_row_share_n_share_maxima():
-    found = window_lines(T, cosines(2.0), n_peaks=6, n_share=2)
+def test_windows_in_a_row_share_n_overlap_maxima():
+    found = window_lines(T, cosines(2.0), n_peaks=6, n_overlap=2)
     assert np.diff(found.first[0]).tolist() == [200] * (found.counts[0] - 1)  # 4 periods of 50
     assert (found.last - found.first == 250).all()
 
@@ -66,33 +66,33 @@ def test_phase_is_relative_to_the_clocks_maxima():
 
 
 def test_own_clock_puts_every_node_at_a_maximum():
-    f = fourier_features(T, cosines([2.0, 2.5, 3.3], [0.0, 1.0, 2.0]), clock="own")
+    f = fourier_features(T, cosines([2.0, 2.5, 3.3], [0.0, 1.0, 2.0]), window_reference="own")
     assert np.abs(f.phase).max() < 0.3
     np.testing.assert_allclose(f.frequency, [2.0, 2.5, 3.3], atol=0.02)
 
 
 def test_own_clock_counts_the_windows_of_the_slowest_node():
     u = cosines([1.0, 4.0])
-    own = window_lines(T, u, clock="own")
+    own = window_lines(T, u, window_reference="own")
     assert own.counts.tolist() == [2, 14]
     assert np.isfinite(own.amplitude).sum(axis=1).tolist() == [2, 14]
-    f = fourier_features(T, u, clock="own")
+    f = fourier_features(T, u, window_reference="own")
     assert f.n_windows == 2
     assert np.isfinite(f.as_array()).all()
 
 
 def test_own_clock_gives_each_node_the_same_bits_alone_as_in_company():
     u = cosines([1.3, 2.0, 4.1], [0.1, 0.2, 0.3])
-    together = fourier_features(T, u, clock="own").as_array()
+    together = fourier_features(T, u, window_reference="own").as_array()
     for j in range(3):
-        alone = fourier_features(T, u[:, j : j + 1], clock="own").as_array()
+        alone = fourier_features(T, u[:, j : j + 1], window_reference="own").as_array()
         assert np.array_equal(together[:, j : j + 1], alone)
 
 
-def test_clock_node_chooses_the_clock():
+def test_reference_node_chooses_the_clock():
     u = cosines([1.0, 4.0])
-    assert fourier_features(T, u, clock_node=0).n_windows == 2
-    assert fourier_features(T, u, clock_node=1).n_windows == 14
+    assert fourier_features(T, u, reference_node=0).n_windows == 2
+    assert fourier_features(T, u, reference_node=1).n_windows == 14
 
 
 def alternating_phases(low, high):
@@ -106,7 +106,7 @@ def alternating_phases(low, high):
 def test_circular_and_arithmetic_means_differ_across_the_cut():
     # phases just below pi and just above -pi: opposite signs, nearly one direction
     t, u = alternating_phases(np.pi - 0.2, np.pi + 0.2)
-    options = {"n_share": 1, "refine": "sine-fit"}
+    options = {"n_overlap": 1, "refine": "sine-fit"}
     circular = fourier_features(t, u, **options)
     arithmetic = fourier_features(t, u, phase_mean="arithmetic", **options)
     # by hand: 7 times -0.2 and 6 times 0.2 about pi have mean -0.2 / 13, and deviations with
@@ -162,7 +162,7 @@ def assert_no_features(f, status):
 def test_a_still_run_is_steady_however_many_tiny_maxima_it_has():
     u = 1.7 + 1e-3 * np.random.default_rng(0).normal(size=(2001, 3))
     assert_no_features(fourier_features(T, u), Status.STEADY)
-    f = fourier_features(T, u, still=1e-4)  # asked for, they are analysed
+    f = fourier_features(T, u, steady_threshold=1e-4)  # asked for, they are analysed
     assert f.status is Status.DONE
     assert np.isfinite(f.as_array()).all()
 
@@ -171,27 +171,37 @@ def test_the_limit_is_on_the_mean_over_nodes_of_the_deviation():
     u = np.concatenate([np.full((2001, 3), 2.0), cosines(2.0, amplitude=np.sqrt(2))], axis=1)
     # deviations 0, 0, 0, 1 over 2001 samples, whose mean is close to 1/4
     deviation = u.std(axis=0).mean()
-    assert fourier_features(T, u, clock_node=3, still=deviation * 1.001).status is Status.STEADY
-    assert fourier_features(T, u, clock_node=3, still=deviation * 0.999).status is Status.DONE
+    assert (
+        fourier_features(T, u, reference_node=3, steady_threshold=deviation * 1.001).status
+        is Status.STEADY
+    )
+    assert (
+        fourier_features(T, u, reference_node=3, steady_threshold=deviation * 0.999).status
+        is Status.DONE
+    )
     for still in (0.0, 10.0):
-        assert fourier_features(T, u, still=still).deviation == pytest.approx(deviation, rel=1e-12)
+        assert fourier_features(T, u, steady_threshold=still).deviation == pytest.approx(
+            deviation, rel=1e-12
+        )
 
 
 def test_a_constant_run_has_no_window_if_nothing_counts_as_still():
-    assert_no_features(fourier_features(T, np.ones((2001, 2)), still=0.0), Status.NO_WINDOW)
+    assert_no_features(
+        fourier_features(T, np.ones((2001, 2)), steady_threshold=0.0), Status.NO_WINDOW
+    )
 
 
 @pytest.mark.parametrize("clock", ["ring", "own"])
 def test_few_long_periods_leave_no_window(clock):
     u = cosines(0.45, [0.0, 1.0])  # nine maxima
-    assert_no_features(fourier_features(T, u, clock=clock), Status.NO_WINDOW)
-    assert fourier_features(T, u, clock=clock, n_peaks=8).status is Status.DONE
+    assert_no_features(fourier_features(T, u, window_reference=clock), Status.NO_WINDOW)
+    assert fourier_features(T, u, window_reference=clock, n_peaks=8).status is Status.DONE
 
 
 def test_own_clock_has_no_window_as_soon_as_one_node_has_none():
     u = cosines([2.0, 0.3])
-    assert_no_features(fourier_features(T, u, clock="own"), Status.NO_WINDOW)
-    assert fourier_features(T, u, clock="ring").status is Status.DONE
+    assert_no_features(fourier_features(T, u, window_reference="own"), Status.NO_WINDOW)
+    assert fourier_features(T, u, window_reference="ring").status is Status.DONE
 
 
 def test_a_node_that_stands_still_among_others_has_zeros():

@@ -70,7 +70,7 @@ def test_sine_fit_in_absolute_time_gives_the_profiles_back(signal, clock, phase_
     f = fourier_features(
         T,
         signal,
-        clock=clock,
+        window_reference=clock,
         refine="sine-fit",
         time_origin="absolute",
         phase_mean=phase_mean,
@@ -83,13 +83,13 @@ def test_sine_fit_in_absolute_time_gives_the_profiles_back(signal, clock, phase_
 
 
 def test_three_steps_have_the_bias_of_the_parabola(signal):
-    frequency, amplitude, _ = errors(fourier_features(T, signal, clock="own"))
+    frequency, amplitude, _ = errors(fourier_features(T, signal, window_reference="own"))
     assert 1e-4 < frequency < 3e-3
     assert 1e-5 < amplitude < 1e-3
 
 
 def test_three_steps_lose_the_phase_far_from_time_zero(signal):
-    f = fourier_features(T, signal, clock="own", time_origin="absolute")
+    f = fourier_features(T, signal, window_reference="own", time_origin="absolute")
     assert errors(f)[2] > 1.0
 
 

@@ -45,18 +45,18 @@ def assert_same_features(features, expected, tolerance):
 @pytest.mark.parametrize("time_origin", ORIGINS)
 def test_three_steps_equal_rfft_polyfit_and_lstsq(clock, phase_mean, time_origin):
     t, u = oscillators()
-    options = {"clock": clock, "phase_mean": phase_mean, "time_origin": time_origin}
+    options = {"window_reference": clock, "phase_mean": phase_mean, "time_origin": time_origin}
     features = fourier_features(t, u, **options)
     assert features.n_windows >= 3
     assert_same_features(features, naive.fourier_features(t, u, **options), 1e-10)
 
 
 @pytest.mark.parametrize(
-    ("n_peaks", "n_share", "clock_node"), [(3, 0, 1), (4, 3, 2), (6, 2, 3), (12, 11, 0)]
+    ("n_peaks", "n_overlap", "reference_node"), [(3, 0, 1), (4, 3, 2), (6, 2, 3), (12, 11, 0)]
 )
-def test_other_windows_equal_the_twin(n_peaks, n_share, clock_node):
+def test_other_windows_equal_the_twin(n_peaks, n_overlap, reference_node):
     t, u = oscillators()
-    options = {"n_peaks": n_peaks, "n_share": n_share, "clock_node": clock_node}
+    options = {"n_peaks": n_peaks, "n_overlap": n_overlap, "reference_node": reference_node}
     expected = naive.fourier_features(t, u, **options)
     assert_same_features(fourier_features(t, u, **options), expected, 1e-10)
 
@@ -65,7 +65,7 @@ def test_other_windows_equal_the_twin(n_peaks, n_share, clock_node):
 @pytest.mark.parametrize("time_origin", ORIGINS)
 def test_sine_fit_equals_a_general_optimiser(clock, time_origin):
     t, u = oscillators()
-    options = {"clock": clock, "refine": "sine-fit", "time_origin": time_origin}
+    options = {"window_reference": clock, "refine": "sine-fit", "time_origin": time_origin}
     features = fourier_features(t, u, **options)
     # the optimiser stops where its cost no longer changes: frequencies to 1e-8, times 2 pi t
     tolerance = 1e-7 if time_origin == "window" else 1e-5

@@ -42,7 +42,7 @@ def test_maxima_of_every_other_sample_all_fit():
 
 
 @pytest.mark.parametrize(
-    ("count", "n_peaks", "n_share", "expected"),
+    ("count", "n_peaks", "n_overlap", "expected"),
     [
         (9, 10, 5, []),
         (10, 10, 5, [(0, 9)]),
@@ -54,20 +54,20 @@ def test_maxima_of_every_other_sample_all_fit():
         (0, 3, 0, []),
     ],
 )
-def test_windows_of_hand_made_lists(count, n_peaks, n_share, expected):
-    first, last = windows(10 * np.arange(count), n_peaks, n_share)
+def test_windows_of_hand_made_lists(count, n_peaks, n_overlap, expected):
+    first, last = windows(10 * np.arange(count), n_peaks, n_overlap)
     assert list(zip(first // 10, last // 10, strict=True)) == expected
 
 
 @given(st.sets(st.integers(0, 500)), st.integers(3, 12), st.data())
-def test_windows_hold_n_peaks_maxima_share_n_share_and_leave_out_no_complete_one(
+def test_windows_hold_n_peaks_maxima_share_n_overlap_and_leave_out_no_complete_one(
     places, n_peaks, data
 ):
-    n_share = data.draw(st.integers(0, n_peaks - 1))
+    n_overlap = data.draw(st.integers(0, n_peaks - 1))
     peaks = np.array(sorted(places), dtype=np.int64)
-    first, last = windows(peaks, n_peaks, n_share)
+    first, last = windows(peaks, n_peaks, n_overlap)
     inside = [set(peaks[(peaks >= a) & (peaks <= b)]) for a, b in zip(first, last, strict=True)]
     assert all(len(held) == n_peaks for held in inside)
-    assert all(len(a & b) == n_share for a, b in itertools.pairwise(inside))
-    used = (len(inside) - 1) * (n_peaks - n_share) + n_peaks if inside else 0
-    assert len(peaks) - used < (n_peaks - n_share if inside else n_peaks)
+    assert all(len(a & b) == n_overlap for a, b in itertools.pairwise(inside))
+    used = (len(inside) - 1) * (n_peaks - n_overlap) + n_peaks if inside else 0
+    assert len(peaks) - used < (n_peaks - n_overlap if inside else n_peaks)

@@ -114,7 +114,7 @@ def test_distance_is_measured_from_the_centre_in_the_norm_of_the_ball(ball, form
 
 def test_networked_points():
     s = sweep(
-        "n_nodes=60 features.n_peaks=4 features.n_share=2",
+        "n_nodes=60 features.n_peaks=4 features.n_overlap=2",
         "P = [20]\nseeds = 3",
         "networked_fhn",
     )
@@ -195,7 +195,7 @@ def test_features_do_not_depend_on_which_series_are_kept():
 
 def test_signals_beyond_the_range_of_int16_are_measured_all_the_same():
     # u follows the cube root of the links' signal: a large b lifts it beyond 3.2767.
-    s = sweep("b=20.0 features.still=0.0", seeds(1))
+    s = sweep("b=20.0 features.steady_threshold=0.0", seeds(1))
     result = run_block(s, s.points())
     assert result.status[0] in (Status.DONE, Status.NO_WINDOW)
     missing = result.series[0] == MISSING
@@ -234,7 +234,7 @@ def test_samples_of_a_sweep_are_those_of_the_integrator(t_step, t_end, share, di
 # --- a point does not see its block ---------------------------------------------------------------
 
 MIXED_GRID = 'P = [5, 9]\nQ = "P"\norientation = [1, 2]\nb = [0.5, 1e300]\nseeds = 2'
-MIXED = "t_end=12.0 features.start=4.0 features.n_peaks=4 features.n_share=1"
+MIXED = "t_end=12.0 features.start=4.0 features.n_peaks=4 features.n_overlap=1"
 
 
 @pytest.fixture(scope="module")
@@ -459,7 +459,7 @@ def test_science_of_a_task_imports_neither_dask_nor_zarr():
 
 
 def test_after_warm_up_a_block_compiles_nothing(monkeypatch):
-    s = sweep("features.refine=sine-fit features.clock=own")
+    s = sweep("features.refine=sine-fit features.window_reference=own")
     warm_up(s, s.points())
     compiled = []
     monkeypatch.setattr(

@@ -46,7 +46,7 @@ def synthetic(given: AnalysisInput) -> dict[str, Any]:
     truth = synthetic_profiles()._asdict()
     found, errors = {}, {}
     for refine in _REFINES:
-        made = fourier_features(t, u, refine=refine, clock="own", time_origin="absolute")
+        made = fourier_features(t, u, refine=refine, window_reference="own", time_origin="absolute")
         found[refine] = {name: getattr(made, name) for name in truth}
         errors[refine] = {
             name: float(
@@ -80,7 +80,7 @@ def spectrum(given: AnalysisInput) -> dict[str, Any]:
         raise BadInput(f"{text} is not in this sweep")
     t, u = given.series(run)
     y = np.ascontiguousarray(u[:, 0])
-    first, last = windows(maxima(y), given.sweep.features.n_peaks, given.sweep.features.n_share)
+    first, last = windows(maxima(y), given.sweep.features.n_peaks, given.sweep.features.n_overlap)
     window = slice(int(first[0]), int(last[0]) + 1)
     samples = y[window] - y[window].mean()
     amplitude = 2.0 / len(samples) * np.abs(np.fft.rfft(samples))

@@ -99,8 +99,8 @@ def oscillation(given: AnalysisInput) -> dict[str, Any]:
     """Runs of each cell that oscillate, move without oscillating, and rest (sec:moredetdyn).
 
     ``oscillating``: ten maxima fit into the analysis, so the Fourier method can be applied.
-    ``moving``: the signal moves by more than ``features.still``, but too slowly for that. The
-    interval is Wilson's, 95 %, for the share of oscillating runs.
+    ``moving``: the signal moves by more than ``features.steady_threshold``, but too slowly for
+    that. The interval is Wilson's, 95 %, for the share of oscillating runs.
     """
     state = [given.status == code for code in (Status.DONE, Status.NO_WINDOW, Status.STEADY)]
     count = [np.bincount(given.cell[which], minlength=given.n_cells) for which in state]
