@@ -37,12 +37,12 @@ def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[s
     names = [*cut.names, STEADY, NO_WINDOW]
     votes = count_votes(cell_of_point, vote_labels(cut.labels, status, len(cut.names)), n_cells)
     votes = np.pad(votes, ((0, 0), (0, len(names) - votes.shape[1])))
-    modal = modal_labels(votes[:, : len(cut.names)], cut.sizes)
+    modal = modal_votes(votes, cut.sizes)
     entropy = entropy_bits(votes)
     found = []
     for i in range(n_cells):
         cell: dict[str, Any] = {name: column[i].item() for name, column in columns.items()}
-        cell["class"] = names[modal[i]] if modal[i] >= 0 else (STEADY if votes[i].any() else None)
+        cell["class"] = names[modal[i]] if modal[i] >= 0 else None
         cell["votes"] = {names[j]: int(votes[i, j]) for j in np.flatnonzero(votes[i])}
         cell["entropy_bits"] = float(entropy[i])
         found.append(cell)
@@ -76,6 +76,17 @@ def modal_labels(votes: Integers, sizes: Integers) -> Integers:
     leading = votes == votes.max(axis=1, keepdims=True)
     modal = np.where(leading, sizes, -1).argmax(axis=1)
     return np.where(votes.any(axis=1), modal, -1)
+
+
+def modal_votes(votes: Integers, sizes: Integers) -> Integers:
+    """Return the modal class of each row of `votes` (n, k + 2), whose last columns are no classes.
+
+    They count steady runs and those without a window, and decide only where no run has a class:
+    such a row is k (steady), an empty one -1. `sizes` (k,) settles ties, see `modal_labels`.
+    """
+    modal = modal_labels(votes[:, : len(sizes)], sizes)
+    silent = np.where(votes.any(axis=1), len(sizes), -1)
+    return np.where(modal >= 0, modal, silent)
 
 
 def entropy_bits(votes: Integers) -> Floats:

@@ -54,6 +54,7 @@ COMMANDS = (
     Command("retry", "compute failed points once more, and reduce"),
     Command("why", "explain what became of one point: status, tries, who computed it, with what"),
     Command("verify", "decode what is stored, and compute a sample of the points anew"),
+    Command("audit", "say how firm the classes are: recompute a sample, resample the seeds"),
     Command(
         "extend", "add points to a sweep: more seeds, new values on any axis; computes nothing"
     ),

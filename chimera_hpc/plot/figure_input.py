@@ -69,6 +69,8 @@ class FigureInput:
     """Label and value in each cell (n_cells,) of what varies between cells."""
     cells: Mapping[int, Sequence[Mapping[str, Any]]]
     """For each cut its cells (n_cells,) with ``class`` and ``votes``."""
+    kept: Mapping[int, Array] = field(default_factory=dict)
+    """For each cut how often each cell (n_cells,) keeps its modal class, where an audit says so."""
     curves: Mapping[str, Any] = field(default_factory=dict)
     """What analyses made, as in results.json."""
     beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

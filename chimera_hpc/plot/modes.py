@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
+from chimera_hpc.plot.audit import add_kept_panel, open_loose_cells
 from chimera_hpc.plot.figure_input import FigureInput
 
 Classes = Sequence[str | None]
@@ -23,17 +24,26 @@ def modal_classes_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     classes = data.classes(n_clusters)
     if len(data.axes) not in (1, 2) or not any(classes):
         return None
-    return modal_classes(data.axes, classes, data.votes(n_clusters))
+    kept = data.kept.get(n_clusters)
+    return modal_classes(data.axes, classes, data.votes(n_clusters), kept)
 
 
 @style.styled
-def modal_classes(parameters: Parameters, classes: Classes, votes: Votes = ()) -> Figure:
-    """Draw the modal class of each cell; arguments as in `draw_modal_classes`."""
+def modal_classes(
+    parameters: Parameters, classes: Classes, votes: Votes = (), kept: ArrayLike | None = None
+) -> Figure:
+    """Draw the modal class of each cell; arguments as in `draw_modal_classes`.
+
+    `kept` (k,) is the share of the resamplings of a cell's seeds that keep its class (`plot.audit`).
+    """
     size = (0.8, 2.3) if len(parameters) == 1 else (1.2, 3.2)
     figure, (axes,) = style.new_panels(1, style.COLUMN + size[0], size[1])
     draw_modal_classes(axes, parameters, classes, votes)
     if len(parameters) == 2:
-        style.add_class_legend(figure, filter(None, classes))
+        loose = [] if kept is None else open_loose_cells(axes, parameters, classes, kept)
+        style.add_class_legend(figure, filter(None, classes), loose)
+    elif kept is not None:
+        add_kept_panel(figure, axes, parameters[0][1], classes, kept)
     return figure
 
 

@@ -17,6 +17,8 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.modes import run_names
+from chimera_hpc.reduction.audit import Basis, Judge, basis_of, kept_audit
+from chimera_hpc.reduction.audit_runs import Runs
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.record import reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
@@ -139,6 +141,10 @@ class _Work:
             store.sweep, store.points, self.ledger, made, self.curves, claims
         )
         self.curves = self.results["curves"]
+        audit, line = kept_audit(self.folder, self._basis)
+        self.results |= audit
+        if line:
+            self.note(line)
         store.write_reduction(*self._variables())
         write_atomically(self.folder / RESULTS, to_json(self.results).encode())
         self._say(_coverage(self.results["points"]))
@@ -146,6 +152,13 @@ class _Work:
         self.table = class_table(
             {str(k): self.results["cuts"][str(k)]["cells"] for k in self.cuts}, self.axes
         )
+
+    def _basis(self) -> Basis:
+        """What an audit of these classes stands on."""
+        cuts = {k: (cut.labels, cut.names) for k, cut in self.classification.cuts.items()}
+        judge = Judge.of(self.store, Atlas.of(self.classification), self.atlases)
+        runs = Runs(self.status, self.triplets, self.scalars["distance"], self.ledger["steps"])
+        return basis_of(self.store, self.ledger, runs, cuts, judge)
 
     def _analyses(self) -> dict[str, Any]:
         """Make what ``reduction.analyses`` asks for."""
@@ -244,6 +257,7 @@ class _Work:
             axes=[(axis.symbol, axis.values) for axis in self.axes],
             cells={k: self.results["cuts"][str(k)]["cells"] for k in self.cuts},
             curves=self.curves,
+            kept=self._kept(),
             beside=curves_beside(self.folder, store.sweep.reduction.beside, self.note),
             shown=shown_runs(store, self.status, self.triplets, first, runs, self.axes, self.note)
             if needs_runs
@@ -252,6 +266,11 @@ class _Work:
             if "whole_run" in names
             else (),
         )
+
+    def _kept(self) -> dict[int, NDArray[np.float64]]:
+        """How often each cell keeps its modal class, by cut, where there is an audit."""
+        found = self.results.get("audit", {"bootstrap": {"kept": {}}})["bootstrap"]["kept"]
+        return {int(k): np.array(shares, dtype=np.float64) for k, shares in found.items()}
 
     def tell(self, figures: Sequence[Path]) -> None:
         """Say what was found and where it is."""

@@ -170,6 +170,43 @@ class _Points(_Part):
     pending: int
 
 
+class _Way(_Part):
+    what: str
+    steps: float
+    failed: dict[str, int]
+    changed: int
+    of: int
+    low: float
+    high: float
+    total_variation: float
+
+
+class _Loose(_Part):
+    place: dict[str, int | float]
+    modal_class: str = Field(alias="class")
+    kept: float
+
+
+class _Bootstrap(_Part):
+    draws: int
+    cells: int
+    single: int
+    mean: float | None
+    loose: list[_Loose]
+    kept: dict[str, list[float | None]]
+
+
+class _Audit(_Part):
+    key: str
+    labels: str
+    points: int
+    of: int
+    total: int
+    ways: dict[str, _Way]
+    changed: list[dict[str, Any]]
+    bootstrap: _Bootstrap
+
+
 class _Results(_Part):
     version: Literal[1] = Field(alias="schema")
     sweep: str
@@ -177,6 +214,7 @@ class _Results(_Part):
     cuts: dict[str, _Cut]
     curves: dict[str, Any]
     claims: list[dict[str, Any]]
+    audit: _Audit | None = None
 
 
 def to_json(results: Mapping[str, Any]) -> str:

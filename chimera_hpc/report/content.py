@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Classification, Cut, classify
-from chimera_hpc.classify.modes import count_votes, modal_labels, vote_labels
+from chimera_hpc.classify.modes import count_votes, modal_votes, vote_labels
 from chimera_hpc.classify.naming import NO_WINDOW, STEADY
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
 from chimera_hpc.reduction.reduction import RESULTS
@@ -147,9 +147,7 @@ class Content:
         labels = vote_labels(cut.labels, self.status, len(cut.names))
         votes = count_votes(self.cell, labels, self.n_cells)
         votes = np.pad(votes, ((0, 0), (0, len(names) - votes.shape[1])))
-        modal = modal_labels(votes[:, : len(cut.names)], cut.sizes)
-        silent = np.where(votes.any(axis=1), len(cut.names), -1)
-        return CellVotes(names, votes, np.where(modal >= 0, modal, silent))
+        return CellVotes(names, votes, modal_votes(votes, cut.sizes))
 
     def cell_name(self, i: int) -> str:
         """Return where a cell lies: ``P = 9, Q = 3``."""

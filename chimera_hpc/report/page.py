@@ -22,6 +22,13 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
 from chimera_hpc.reduction.atlases import curves_beside
+from chimera_hpc.reduction.audit_text import (
+    HEAD,
+    audit_rows,
+    bootstrap_lines,
+    changed_lines,
+    sample_line,
+)
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.report import charts
 from chimera_hpc.report.content import Content
@@ -100,6 +107,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "runs": _runs(content),
         "spec": json.dumps(content.store.sweep.to_dict(), indent=1),
         "claims": content.results.get("claims", []),
+        "audit": _audit(content),
         "names": {name: list(group) for name, group in _groups(figures).items()},
         "script": loader.get_source(environment, "report.js")[0],
         "style": loader.get_source(environment, "report.css")[0],
@@ -149,6 +157,20 @@ def _robustness(content: Content) -> dict[str, Mapping[str, Any]]:
             label = str(entry["label"]).replace("$", "")
             found[f"{label}, judged by {judge}"] = curve
     return found
+
+
+def _audit(content: Content) -> dict[str, Any]:
+    """Return what the page shows of the audit; empty without one."""
+    audit = content.results.get("audit")
+    if not audit:
+        return {}
+    return {
+        "sample": sample_line(audit),
+        "head": HEAD,
+        "rows": audit_rows(audit),
+        "changed": changed_lines(audit),
+        "cells": bootstrap_lines(audit),
+    }
 
 
 def _title(content: Content) -> str:

@@ -48,6 +48,7 @@ def run_block(
     on_point: Callable[[int, Status], None] | None = None,
     on_signals: OnSignals | None = None,
     lanes: int | None = None,
+    nudge: float = 0.0,
 ) -> BlockResult:
     """Integrate the points and measure their series.
 
@@ -68,8 +69,10 @@ def run_block(
         not get to, as they were before u was rounded. They are buffers: copy what is to be kept.
     lanes : int, optional
         Lanes of the stepping loop; chosen from the work by default.
+    nudge : float
+        How far initial states are moved (see `initial_state`); 0 for a sweep's own points.
     """
-    block = _Block(sweep, points, on_signals)
+    block = _Block(sweep, points, on_signals, nudge)
     with suppress(Stopped):
         for rows in _lane_groups(block.models):
             factor = 1.0
@@ -110,13 +113,16 @@ def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
 class _Block:
     """Models, initial states and the result that the runs fill."""
 
-    def __init__(self, sweep: Sweep, points: Points, on_signals: OnSignals | None) -> None:
+    def __init__(
+        self, sweep: Sweep, points: Points, on_signals: OnSignals | None, nudge: float = 0.0
+    ) -> None:
         n, times = len(points), sample_times(sweep)
         self.sweep, self.times, self.on_signals = sweep, times, on_signals
         rows = [points.row(i) for i in range(n)]
         self.models = [build(sweep, row) for row in rows]
         self.initial = [
-            initial_state(sweep, row, model) for row, model in zip(rows, self.models, strict=True)
+            initial_state(sweep, row, model, nudge)
+            for row, model in zip(rows, self.models, strict=True)
         ]
         self.options = sweep.features.options()
         self.keeps = series_mask(sweep, points.columns["seed"])

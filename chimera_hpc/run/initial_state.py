@@ -13,13 +13,14 @@ from chimera_hpc.models.protocol import Model, Row
 Array = NDArray[np.float64]
 
 
-def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:
+def initial_state(sweep: Sweep, row: Row, model: Model, nudge: float = 0.0) -> tuple[Array, Array]:
     """Draw the initial state (u, v) of a point.
 
     Uniform in the ball of radius ``delta`` around ``integrator.centre``: in the maximum norm every
     variable is ``centre + delta * U[-1, 1]``, u first, then v (paper sec. Method and results). In
     the Euclidean norm the direction is Gaussian and the radius ``delta * U**(1/n)``. A user's model
-    may draw it otherwise, from the same stream.
+    may draw it otherwise, from the same stream. `nudge` then moves every variable x by
+    ``nudge * max(1, |x|) * U[-1, 1]``, drawn from that stream, too.
 
     Returns
     -------
@@ -28,8 +29,19 @@ def initial_state(sweep: Sweep, row: Row, model: Model) -> tuple[Array, Array]:
     """
     stream = initial_stream(*stream_key(sweep.model, sweep.n_nodes, row))
     drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
-    if drawn is not None:
-        return drawn
+    if drawn is None:
+        drawn = _in_the_ball(sweep, row, model, stream)
+    return (_moved(drawn[0], nudge, stream), _moved(drawn[1], nudge, stream)) if nudge else drawn
+
+
+def _moved(state: Array, nudge: float, stream: np.random.Generator) -> Array:
+    size = nudge * np.maximum(1.0, np.abs(state))
+    return state + size * stream.uniform(-1.0, 1.0, len(state))
+
+
+def _in_the_ball(
+    sweep: Sweep, row: Row, model: Model, stream: np.random.Generator
+) -> tuple[Array, Array]:
     size = model.n_nodes + model.n_second
     if sweep.integrator.ball == "maximum":
         offset = stream.uniform(-1.0, 1.0, size)
