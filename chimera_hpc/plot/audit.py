@@ -47,17 +47,28 @@ def add_kept_panel(
     axes.tick_params(labelbottom=False)
 
 
-def open_loose_cells(axes: Axes, x: ArrayLike, y: ArrayLike, kept: ArrayLike) -> list[Line2D]:
-    """Open the markers of the cells (x, y) that are not firm; return what the legend says of it.
+def open_loose_cells(
+    axes: Axes,
+    parameters: Sequence[tuple[str, ArrayLike]],
+    classes: Sequence[str | None],
+    kept: ArrayLike,
+) -> list[Line2D]:
+    """Open the markers of the cells that are not firm; return what the legend says of it.
 
-    `kept` (k,) is the share of the resamplings of a cell's seeds that keep its class.
+    `parameters` are label and value (k,) of two parameters, `kept` (k,) is the share of the
+    resamplings of a cell's seeds that keep its class.
     """
     loose = np.asarray(kept, dtype=np.float64) < FIRM
-    horizontal, vertical = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    axes.scatter(
-        horizontal[loose], vertical[loose], s=5.0, color="#ffffff", linewidths=0.0, zorder=3.0
-    )
+    x, y = (np.asarray(values, dtype=np.float64) for _, values in parameters)
+    for name in dict.fromkeys(classes):
+        mine = loose & np.array([other == name for other in classes])
+        axes.scatter(
+            *(x[mine], y[mine]),
+            s=4.5,
+            marker=style.marker_of(name),
+            color="#ffffff",
+            linewidths=0.0,
+            zorder=3.0,
+        )
     label = f"stays in < {FIRM:.0%}"
-    return [
-        Line2D([], [], linestyle="none", marker="o", fillstyle="none", color="#555555", label=label)
-    ]
+    return [Line2D([], [], ls="none", marker="o", fillstyle="none", color="#555555", label=label)]

@@ -34,7 +34,7 @@ def modal_classes(
 ) -> Figure:
     """Draw the modal class of each cell; arguments as in `draw_modal_classes`.
 
-    `kept` (k,) is the share of the resamplings of a cell's seeds that keep its class (`plot.audit`).
+    `kept` (k,) is the share of resamplings that keep the class of a cell, see `plot.audit`.
     """
     size = (0.8, 2.3) if len(parameters) == 1 else (1.2, 3.2)
     figure, (axes,) = style.new_panels(1, style.COLUMN + size[0], size[1])

@@ -58,10 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     audit: dict[str, Any] = {}
     if not args.no_audit and not failed and names:
         from scoreboard.audit import audit_jobs
-        from scoreboard.audit_figures import draw_audit
 
         audit = audit_jobs(folder, names, args.share, args.workers, print)
-        draw_audit(folder, audit)
     rows = scoreboard(read_claims(args.jobs / "claims.toml"), Evidence(folder))
     spent = cost(time.monotonic() - began)
     tried = args.jobs / _TRIED
