@@ -15,6 +15,8 @@ Integers = NDArray[np.int64]
 
 Linkage = Literal["ward", "average", "complete"]
 LINKAGES: tuple[Linkage, ...] = ("ward", "average", "complete")
+MOST_BY_SCIPY = 4_000
+"""Points of a tree by Ward's method that SciPy grows, in 64 MB."""
 
 
 def limits(points: Floats) -> Floats:
@@ -39,16 +41,16 @@ def grow(scaled: Floats, method: Linkage) -> Floats:
     """Return SciPy's linkage matrix (m - 1, 4) of m points; (0, 4) for fewer than two.
 
     Row i merges two clusters into cluster m + i at the height in column 2; heights never fall
-    (true of ward, average and complete linkage). Ward's takes O(m) memory (D. Müllner, J. Stat.
-    Softw. 53(9), 2013), the others O(m^2); all take O(m^2) time.
+    (true of ward, average and complete linkage). Takes O(m^2) time and memory; Ward's beyond
+    `MOST_BY_SCIPY` points takes O(m) memory.
     """
     if len(scaled) < 2:
         return np.empty((0, 4))
-    if method == "ward":
-        # Imported here: nothing but a reduction needs it.
-        import fastcluster
+    if method == "ward" and len(scaled) > MOST_BY_SCIPY:
+        # Imported here: it loads numba.
+        from chimera_hpc.classify import chain
 
-        return np.asarray(fastcluster.linkage_vector(scaled, "ward"), dtype=np.float64)
+        return chain.ward(scaled)
     # Distances, not points: as many points as columns could be taken for a matrix of distances.
     return np.asarray(hierarchy.linkage(pdist(scaled), method=method), dtype=np.float64)
 

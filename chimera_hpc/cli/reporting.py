@@ -17,8 +17,9 @@ _LIVE_TREE = 2_000
 _LIVE_POINTS = 50_000
 """A larger sweep gets its report at the end only: reading all its results takes too long."""
 _REDUCING = (
-    *("chimera_hpc.reduction.reduction", "chimera_hpc.reduction.atlases"),
-    *("chimera_hpc.reduction.analyses.ring", "fastcluster"),
+    "chimera_hpc.reduction.reduction",
+    "chimera_hpc.reduction.atlases",
+    "chimera_hpc.reduction.analyses.ring",
 )
 """What every reduction loads, or most of them."""
 

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_KERNEL_FOLDERS = ("integrate", "models", "measures")
+_KERNEL_FOLDERS = ("integrate", "models", "measures", "classify")
 _UNUSED_DAYS = 30
 _OLD = re.compile(r"[0-9a-f]{16}(\.[0-9a-f]{32}\.old)?")
 """Name of a cache folder, or of one whose removal was broken off."""
