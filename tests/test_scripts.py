@@ -73,7 +73,16 @@ def one_line_error(tree: Path, **environment: str) -> str:
 
 def test_unsuitable_python_is_one_line(tmp_path):
     errors = one_line_error(make_tree(tmp_path / "tree"), PYTHON="/bin/false")
-    assert errors.startswith("PYTHON=/bin/false is not Python 3.11, 3.12 or 3.13")
+    assert errors.startswith("PYTHON=/bin/false: no Python 3.11 to 3.14 was found")
+
+
+def test_python_without_its_venv_module_is_one_line(tmp_path):
+    python = tmp_path / "python3.14"
+    python.write_text('#!/bin/sh\n[ "$1" = -V ] && echo Python 3.14.1\n')
+    python.chmod(0o755)
+    errors = one_line_error(make_tree(tmp_path / "tree"), PYTHON=str(python))
+    assert errors.startswith(f"{python} has no module venv or ensurepip")
+    assert errors.endswith("apt install python3-venv\n")
 
 
 def test_no_python_is_one_line(tmp_path):
@@ -82,7 +91,7 @@ def test_no_python_is_one_line(tmp_path):
     for name in ("bash", "dirname"):
         (commands / name).symlink_to(shutil.which(name))
     errors = one_line_error(make_tree(tmp_path / "tree"), PYTHON="", PATH=str(commands))
-    assert errors.startswith("no Python 3.11, 3.12 or 3.13")
+    assert errors.startswith("no Python 3.11 to 3.14")
 
 
 @pytest.mark.slow
