@@ -64,8 +64,9 @@ class _Clusters:
         self.centroids[one] += share * (self.centroids[other] - self.centroids[one])
         self.weights[one] *= 1.0 - share
         self.n -= 1
-        for of_clusters in (self.centroids, self.weights, self.leaves):
-            of_clusters[other] = of_clusters[self.n]
+        self.centroids[other] = self.centroids[self.n]
+        self.weights[other] = self.weights[self.n]
+        self.leaves[other] = self.leaves[self.n]
 
 
 def _merges(points: Floats) -> Iterator[tuple[int, int, float]]:
