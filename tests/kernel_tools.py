@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from chimera_hpc.integrate import lane_rows as K
-from chimera_hpc.integrate.lanes import Control, Lanes, Outcome, integrate
+from chimera_hpc.integrate.lanes import Control, LanePool, Outcome, integrate
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
 from chimera_hpc.job import registry
@@ -91,22 +91,22 @@ def run_all(systems, states, control, n_observed=None, **options):
 def fixed_steps(system, y0, counts, t_end, method, sampling=None):
     """Cross [0, t_end] in equal steps with the real loop, one number of steps for each lane.
 
-    The step size of each lane is set anew before each call of the loop, which tries one step; the
+    The step size of each lane is set before each call of the loop, which tries one step; the
     tolerance is too loose to reject any. Returns the last states (rows, lanes) and the samples.
     """
     assert len(counts) == LANES
     control = Control(t_end, 0.0, sampling or t_end, rtol=1e6, atol=1e6, method=method)
-    pool = Lanes(LANES, system, control, system.n_rows)
+    pool = LanePool(LANES, system, control, system.n_rows)
     for lane in range(LANES):
         pool.put(lane, y0, system.lane_params)
     pool.iterations = 0
     pool.run()
-    while (running := pool.count[K.STATE] == K.RUNNING).any():
-        final = pool.count[K.ACCEPTED] == np.array(counts) - 1
-        h = np.where(final, t_end - pool.lane[K.TIME], t_end / np.array(counts))
-        pool.lane[K.STEP] = np.where(running, h, 0.0)
+    while (running := pool.lanes.counters[K.STATE] == K.RUNNING).any():
+        final = pool.lanes.counters[K.ACCEPTED] == np.array(counts) - 1
+        h = np.where(final, t_end - pool.lanes.lane[K.TIME], t_end / np.array(counts))
+        pool.lanes.lane[K.STEP] = np.where(running, h, 0.0)
         pool.iterations = 1
         pool.run()
-    assert list(pool.count[K.ACCEPTED]) == list(counts)
+    assert list(pool.lanes.counters[K.ACCEPTED]) == list(counts)
     samples = np.stack([pool.sampled(lane) for lane in range(LANES)])
-    return pool.y[: pool.size].copy(), samples
+    return pool.lanes.y[: pool.size].copy(), samples

@@ -44,7 +44,7 @@ def _is_worth_it() -> bool:
     folder = Path(cache_folder())
     # A folder for this process alone, where no other can be written, is of no use to two.
     shared = folder.name == source_digest()
-    return shared and usable_cores() > 1 and not any(folder.glob("*/stepper._advance_pack-*.nbc"))
+    return shared and usable_cores() > 1 and not any(folder.glob("*/stepper._advance_vector-*.nbc"))
 
 
 def _start() -> subprocess.Popen[bytes]:

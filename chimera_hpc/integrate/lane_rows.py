@@ -1,11 +1,11 @@
-"""What the lanes of the stepping loop keep beside their states, by the number of the row."""
+"""Rows of the numbers and counters that the stepping loop keeps for each lane."""
 
 # Rows of the lanes' numbers, ``lane`` (LANE_ROWS, lanes).
 TIME, STEP, LOG_ERROR, ERROR_SUM, LOG_ERROR_NEW, TIME_NEW = 0, 1, 2, 3, 4, 5
 THETA, THETA_AFTER = 6, 7
 LANE_ROWS = 8
-# Rows of the lanes' counters, ``count`` (COUNT_ROWS, lanes).
+# Rows of the lanes' counters, ``counters`` (COUNT_ROWS, lanes).
 STATE, NEXT_SAMPLE, ACCEPTED, TRIED, REJECTED_LAST, IS_DUE, IS_DUE_AFTER = 0, 1, 2, 3, 4, 5, 6
 COUNT_ROWS = 7
-# Values of the row STATE that are no `Status`: nothing to do, put in anew, on its way.
+# Values of the row STATE that are not a `Status`: empty, just put in, running.
 IDLE, FRESH, RUNNING = -2, -1, 0

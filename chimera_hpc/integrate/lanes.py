@@ -1,4 +1,4 @@
-"""Keeps the lanes of the stepping loop busy: puts trajectories in, takes finished ones out."""
+"""Keeps the lanes of the stepping loop busy: puts trajectories in and takes finished ones out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
-from chimera_hpc.integrate import stepper as kernel
+from chimera_hpc.integrate import stepper
+from chimera_hpc.integrate.arguments import Lanes, Limits, Method
 from chimera_hpc.integrate.lane_rows import (
     ACCEPTED,
     COUNT_ROWS,
@@ -24,25 +25,25 @@ from chimera_hpc.integrate.lane_rows import (
     RUNNING,
     STATE,
 )
-from chimera_hpc.integrate.scratch import aligned, lent
+from chimera_hpc.integrate.scratch import aligned, scratch_buffer
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.integrate.tableau import Tableau
 from chimera_hpc.integrate.tsit5 import TSIT5
 
 Array = NDArray[np.float64]
 
-# Wall time that one call of the compiled loop aims at, seconds: the GIL comes back, time-outs and
-# stop signals are seen.
+# Wall time that one call of the compiled loop aims at, seconds: between calls Python has the GIL
+# and sees time-outs and stop signals.
 SLICE = 0.1
 # Steps times numbers of the state in the first call, before the speed is known, and its most steps.
 FIRST_WORK, FIRST_STEPS = 2_000_000, 64
 # Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
 SAMPLE_BYTES = 96_000_000
-# Bytes of state that a pack may work on: as much as stays in a core's second cache. Beyond, one
-# lane after the other is faster, since it has an eighth of it.
-PACK_BYTES = 1_000_000
-# Fewer trajectories than this go one by one: idle lanes of a pack cost as much as busy ones.
-WORTH_A_PACK = 3
+# Bytes of state of `LANES` trajectories together: as much as stays in a core's second cache.
+# Beyond, one trajectory after the other is faster, since its state is an eighth of that.
+VECTOR_BYTES = 1_000_000
+# Fewer trajectories than this go one by one: idle lanes cost as much as busy ones.
+VECTOR_TRAJECTORIES = 3
 
 
 class System(Protocol):
@@ -109,10 +110,10 @@ class Stopped(Exception):
     """The caller asked to stop before every trajectory had ended."""
 
 
-class Lanes:
-    """The state of the stepping loop's lanes (arrays as in `kernel`).
+class LanePool:
+    """The lanes of the stepping loop and what each of them works on.
 
-    ``samples`` (lanes, n_samples, width) is room for samples in whole packs; new by default.
+    ``samples`` (lanes, n_samples, width) is room for samples in whole vectors; new by default.
     """
 
     def __init__(
@@ -123,71 +124,76 @@ class Lanes:
         n_observed: int,
         samples: Array | None = None,
     ) -> None:
-        method = control.method
-        # One lane has its rows in packs, up to the last one: rows of zeros fill that. Samples are
-        # written in packs from any number of lanes.
+        m, c = control.method, control
+        # A single lane has its rows in vectors; rows of zeros fill the last one. Samples are
+        # written in vectors from any number of lanes.
         self.size = system.n_rows
-        width = _in_packs(n_observed)
-        rows = _in_packs(self.size) if lanes == 1 else max(self.size, width)
-        self.n_observed = n_observed
-        self.control, self.method = control, method
+        width = _whole_vectors(n_observed)
+        rows = _whole_vectors(self.size) if lanes == 1 else max(self.size, width)
+        if samples is None:
+            samples = aligned(lanes, c.n_samples, width, fill=np.empty)
+        self.n_observed, self.control = n_observed, control
         self.rhs, self.ints = system.right_hand_side, system.int_params
-        self.advance = kernel.advance(lanes)
         self.params = aligned(len(system.lane_params), lanes)
         self.params[:] = system.lane_params[:, None]
-        self.y, self.y1 = aligned(rows, lanes), aligned(rows, lanes)
-        self.k = aligned((method.stages + 1) * rows, lanes)
-        self.weights = aligned(2 * method.stages, LANES)
-        self.lane = aligned(LANE_ROWS, lanes)
-        self.count = np.zeros((COUNT_ROWS, lanes), dtype=np.int64)
-        self.count[STATE] = IDLE
-        if samples is None:
-            samples = aligned(lanes, control.n_samples, width, fill=np.empty)
-        self.samples = samples
+        self.lanes = Lanes(
+            y=aligned(rows, lanes),
+            y1=aligned(rows, lanes),
+            k=aligned((m.stages + 1) * rows, lanes),
+            weights=aligned(2 * m.stages, LANES),
+            lane=aligned(LANE_ROWS, lanes),
+            counters=np.zeros((COUNT_ROWS, lanes), dtype=np.int64),
+            samples=samples,
+        )
+        self.lanes.counters[STATE] = IDLE
+        self.method = Method(m.a, m.e, m.p, float(m.order))
+        self.limits = Limits(
+            rtol=float(c.rtol),
+            atol=float(c.atol),
+            t_end=float(c.t_end),
+            max_steps=int(c.max_steps),
+            start=float(c.start),
+            step=float(c.step),
+        )
+        self.advance = stepper.advance(lanes)
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:
         """Begin a trajectory in lane ``m``."""
-        self.y[: self.size, m] = y0
+        lanes = self.lanes
+        lanes.y[: self.size, m] = y0
         self.params[:, m] = params
-        self.lane[:, m] = 0.0
-        self.lane[LOG_ERROR, m] = kernel.LOG_ERROR_FLOOR
-        self.count[:, m] = 0
-        self.count[STATE, m] = FRESH
+        lanes.lane[:, m] = 0.0
+        lanes.lane[LOG_ERROR, m] = stepper.LOG_ERROR_FLOOR
+        lanes.counters[:, m] = 0
+        lanes.counters[STATE, m] = FRESH
         if self.control.start <= 0.0:
             self.sampled(m)[:, 0] = y0[: self.n_observed]
-            self.count[NEXT_SAMPLE, m] = 1
+            lanes.counters[NEXT_SAMPLE, m] = 1
 
     def sampled(self, m: int) -> Array:
         """Samples of lane ``m``, shape (n_observed, n_samples)."""
-        samples: Array = self.samples[m, :, : self.n_observed].T
+        samples: Array = self.lanes.samples[m, :, : self.n_observed].T
         return samples
 
     def clear(self, m: int) -> None:
         """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""
-        self.y[:, m] = self.y1[:, m] = self.k[:, m] = 0.0
-        self.lane[:, m] = 0.0
-        self.count[STATE, m] = IDLE
+        lanes = self.lanes
+        lanes.y[:, m] = lanes.y1[:, m] = lanes.k[:, m] = lanes.lane[:, m] = 0.0
+        lanes.counters[STATE, m] = IDLE
 
     def run(self) -> float:
         """Call the compiled loop once; returns the wall time it took, seconds."""
-        c, m = self.control, self.method
         began = time.perf_counter()
         done = self.advance(
-            *(self.rhs, self.params, self.ints, self.y, self.y1, self.k, self.weights),
-            *(
-                self.lane,
-                self.count,
-                self.size,
-                m.a,
-                m.e,
-                m.p,
-                float(m.order),
-                c.rtol,
-                c.atol,
-                c.t_end,
-            ),
-            *(c.max_steps, c.start, c.step, self.samples, self.iterations),
+            self.rhs,
+            self.params,
+            self.ints,
+            self.lanes,
+            self.method,
+            self.limits,
+            self.size,
+            self.iterations,
         )
         elapsed = time.perf_counter() - began
         if done == self.iterations:
@@ -195,18 +201,29 @@ class Lanes:
             self.iterations = int(self.iterations * min(max(scale, 0.25), 8.0)) + 1
         return elapsed
 
+    def outcome(self, m: int, status: Status, elapsed: float) -> Outcome:
+        """Return the end of the trajectory in lane ``m``, after ``elapsed`` seconds."""
+        return Outcome(
+            status,
+            steps=int(self.lanes.counters[ACCEPTED, m]),
+            elapsed=elapsed,
+            samples=self.sampled(m),
+            n_sampled=int(self.lanes.counters[NEXT_SAMPLE, m]),
+            y_end=self.lanes.y[: self.size, m].copy(),
+        )
 
-def _in_packs(n: int) -> int:
+
+def _whole_vectors(n: int) -> int:
     return -(-n // LANES) * LANES
 
 
 def choose_lanes(
     n_trajectories: int, n_rows: int, stages: int, n_observed: int, n_samples: int
 ) -> int:
-    """One lane or a pack, from the number of trajectories and the memory that they take."""
-    fits = LANES * _in_packs(n_observed) * n_samples * 8 <= SAMPLE_BYTES
-    fits = fits and LANES * (stages + 3) * n_rows * 8 <= PACK_BYTES
-    return LANES if n_trajectories >= WORTH_A_PACK and fits else 1
+    """Return 1 or `LANES`, from the number of trajectories and the memory that they take."""
+    fits = LANES * _whole_vectors(n_observed) * n_samples * 8 <= SAMPLE_BYTES
+    fits = fits and LANES * (stages + 3) * n_rows * 8 <= VECTOR_BYTES
+    return LANES if n_trajectories >= VECTOR_TRAJECTORIES and fits else 1
 
 
 def integrate(
@@ -248,23 +265,23 @@ def integrate(
     initial = states if callable(states) else states.__getitem__
     rows, stages = systems[0].n_rows, control.method.stages
     width = lanes or choose_lanes(len(systems), rows, stages, n_observed, control.n_samples)
-    # Kept is what a pack needs, for which `choose_lanes` sets a bound; the samples of a trajectory
-    # alone may have any size, and `simulate` hands them on.
-    shape = width, control.n_samples, _in_packs(n_observed)
-    with nullcontext() if width == 1 else lent(*shape) as samples:
-        pool = Lanes(width, systems[0], control, n_observed, samples)
+    # Only the buffer of several lanes is used again: `choose_lanes` bounds its size. The samples of
+    # a single trajectory may have any size, and `simulate` returns them.
+    shape = width, control.n_samples, _whole_vectors(n_observed)
+    with nullcontext() if width == 1 else scratch_buffer(*shape) as samples:
+        pool = LanePool(width, systems[0], control, n_observed, samples)
         _work_through(pool, systems, initial, on_end, should_stop)
 
 
 def _work_through(
-    pool: Lanes,
+    pool: LanePool,
     systems: Sequence[System],
     initial: Callable[[int], Array],
     on_end: Callable[[int, Outcome], None],
     should_stop: Callable[[], bool] | None,
 ) -> None:
     """Keep the lanes busy until every trajectory has ended."""
-    width = pool.y.shape[1]
+    width = pool.lanes.y.shape[1]
     waiting = iter(range(len(systems)))
     holds: list[int | None] = [None] * width
     spent = np.zeros(width)
@@ -288,20 +305,10 @@ def _work_through(
         spent[busy] += pool.run() / len(busy)
         now = time.perf_counter()
         for m in busy:
-            number, state = holds[m], int(pool.count[STATE, m])
+            number, state = holds[m], int(pool.lanes.counters[STATE, m])
             if state == RUNNING and now - since[m] > pool.control.time_out:
                 state = int(Status.TIME_OUT)
             if state == RUNNING or number is None:
                 continue
-            on_end(
-                number,
-                Outcome(
-                    Status(state),
-                    int(pool.count[ACCEPTED, m]),
-                    float(spent[m]),
-                    pool.sampled(m),
-                    int(pool.count[NEXT_SAMPLE, m]),
-                    pool.y[: pool.size, m].copy(),
-                ),
-            )
+            on_end(number, pool.outcome(m, Status(state), float(spent[m])))
             fill(m)

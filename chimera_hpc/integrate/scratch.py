@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def aligned(*shape: int, fill: Callable[[int], Array] = np.zeros) -> Array:
-    """Zeros, or what `fill` gives, from the start of a cache line: no vector load straddles two."""
+    """Return zeros, or what `fill` gives, from the start of a cache line on."""
     size = int(np.prod(shape))
     raw = fill(size + 8)
     offset = (-raw.ctypes.data // 8) % 8
@@ -21,24 +21,24 @@ def aligned(*shape: int, fill: Callable[[int], Array] = np.zeros) -> Array:
 
 
 class _Kept(threading.local):
-    room: Array | None = None
+    buffer: Array | None = None
 
 
 _kept = _Kept()
 
 
 @contextmanager
-def lent(*shape: int) -> Iterator[Array]:
-    """Lend an array that holds anything; this thread gets the same memory again the next time.
+def scratch_buffer(*shape: int) -> Iterator[Array]:
+    """Provide an array with arbitrary contents; this thread gets the same memory the next time.
 
-    New memory comes from the system page by page, whenever a page is first written to, and that
-    takes time. Whoever asks while the room is lent gets some of his own.
+    New memory comes from the system page by page, at the first write to each page, and that takes
+    time. A second request while the buffer is in use gets memory of its own.
     """
     size = int(np.prod(shape))
-    room, _kept.room = _kept.room, None
-    if room is None or room.size < size:
-        room = aligned(size, fill=np.empty)
+    buffer, _kept.buffer = _kept.buffer, None
+    if buffer is None or buffer.size < size:
+        buffer = aligned(size, fill=np.empty)
     try:
-        yield room[:size].reshape(shape)
+        yield buffer[:size].reshape(shape)
     finally:
-        _kept.room = room
+        _kept.buffer = buffer

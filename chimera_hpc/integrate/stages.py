@@ -1,24 +1,20 @@
 """Weighted sums over the stages of a step: the state of the next stage, the error of the step.
 
-Arrays and notation as in `kernel`. ``units`` counts what is worked on at once: a row of eight
-lanes, or eight rows of one.
+Arrays and notation as in `stepper` and `arguments`. A sum works on one unit at a time: a row of
+eight lanes, or eight rows of one lane.
 """
-
-from __future__ import annotations
-
-from typing import Any
 
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.lane_rows import ERROR_SUM
-from chimera_hpc.integrate.simd import fma, fold, larger, load, magnitude, splat, store
+from chimera_hpc.integrate.simd import broadcast, fma, fold, larger, load, magnitude, store
 
 
 @jit()
-def stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, out: Any) -> None:
-    """Write ``out = y + h * sum_{j < s} a[s, j] k_j``."""
-    # Spelled out up to six terms so that the compiler keeps the weights in registers. The rows go
-    # downwards, those of a right-hand side upwards: each finds in the cache what the other has
-    # left there.
+def stage_sum(h, step, a, s):
+    """Write ``y1 = y + h * sum_{j < s} a[s, j] k_j``, the state at which stage s is the slope."""
+    # Written out up to six terms so that the compiler keeps the weights in registers. The rows go
+    # downwards, those of a right-hand side upwards: each finds in the cache what the other left.
+    y, out, k, first, units = step
     o0 = first
     if s == 1:
         a0 = a[s, 0]
@@ -83,23 +79,22 @@ def stage_sum(h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, s: Any, ou
 
 
 @jit()
-def _add_to_both(total: Any, error: Any, a: Any, e: Any, stage: Any) -> Any:
+def _add_to_both(total, error, a, e, stage):
     return fma(a, stage, total), fma(e, stage, error)
 
 
 @jit()
-def last_stage_sum(
-    h: Any, y: Any, k: Any, first: Any, units: Any, a: Any, e: Any, out: Any
-) -> None:
-    """Write the new state as `stage_sum` does, and what is known of its errors.
+def last_stage_sum(h, step, a, e):
+    """Write the new state as `stage_sum` does, and its error estimate without the last stage.
 
-    The stages are read once for both. The errors, behind the stages in ``k``, are
-    ``sum_{j < s} e_j k_j``: the last stage, the slope at the new state, is still missing.
+    The stages are read once for both. The estimate ``sum_{j < s} e_j k_j`` stands behind the stages
+    in ``k``; the last stage, the slope at the new state, is not known yet.
     """
+    y, out, k, first, units = step
     s = e.size - 1
     errors = (s + 1) * units
     if s == 6:
-        # Spelled out, as above.
+        # Written out, as above.
         a0, a1, a2, a3, a4, a5 = a[s, 0], a[s, 1], a[s, 2], a[s, 3], a[s, 4], a[s, 5]
         e0, e1, e2, e3, e4, e5 = e[0], e[1], e[2], e[3], e[4], e[5]
         for i in range(units - 1, -1, -1):
@@ -123,24 +118,24 @@ def last_stage_sum(
 
 
 @jit()
-def _ratio(i: Any, context: Any) -> Any:
-    h, y, y1, k, last, errors, weight, rtol, atol = context
-    total = fma(weight, load(h, k, last + i), load(h, k, errors + i))
-    size = larger(magnitude(load(h, y, i)), magnitude(load(h, y1, i)))
-    return h * total / fma(rtol, size, atol)
+def _ratio(i, context):
+    h, step, (last, errors), weight, limits = context
+    total = fma(weight, load(h, step.k, last + i), load(h, step.k, errors + i))
+    size = larger(magnitude(load(h, step.y, i)), magnitude(load(h, step.y1, i)))
+    return h * total / fma(limits.rtol, size, limits.atol)
 
 
 @jit()
-def _add_square(total: Any, ratio: Any) -> Any:
+def _add_square(total, ratio):
     return fma(ratio, ratio, total)
 
 
 @jit(inline="always")
-def _add_up(zero: Any, context: Any, units: Any, lane: Any) -> None:
-    # Rows go to eight sums in turn, which are then folded in halves. One lane has its eight sums
-    # side by side in a pack.
+def _add_up(zero, context, units, lane):
+    # Rows go to eight partial sums in turn, which are then folded in halves. A single lane has its
+    # eight sums side by side in a vector.
     if lane.shape[1] == 1:
-        total = splat(0.0)
+        total = broadcast(0.0)
         for i in range(units):
             total = _add_square(total, _ratio(i, context))
         lane[ERROR_SUM, 0] = fold(total)
@@ -168,15 +163,12 @@ def _add_up(zero: Any, context: Any, units: Any, lane: Any) -> None:
 
 
 @jit()
-def error_sum(
-    zero: Any, h: Any, y: Any, y1: Any, k: Any, first: Any, units: Any, e: Any, rtol: Any,
-    atol: Any, lane: Any,
-) -> None:  # fmt: skip
-    """Sum ``(err_i / (atol + rtol max(|y_i|, |y1_i|)))**2``, HNW eq. II.4.11, over the rows.
+def error_sum(zero, h, step, e, limits, lane):
+    """Sum ``(err_i / (atol + rtol max(|y_i|, |y1_i|)))**2`` over the rows, HNW eq. II.4.11.
 
-    To what `last_stage_sum` has left of the errors the last stage is added. The sum goes to the row
-    `ERROR_SUM` of ``lane``.
+    The error estimate is what `last_stage_sum` left plus the last stage's part. The sum goes to the
+    row `ERROR_SUM` of ``lane``.
     """
     s = e.size - 1
-    context = (h, y, y1, k, s * units - first, (s + 1) * units, e[s], rtol, atol)
-    _add_up(zero, context, units, lane)
+    places = s * step.units - step.first, (s + 1) * step.units
+    _add_up(zero, (h, step, places, e[s], limits), step.units, lane)

@@ -1,24 +1,22 @@
 """The compiled stepping loop: `LANES` trajectories, or one, in lock step.
 
-Each lane has its own time, step size and outcome; all of them go through the stages together.
+Each lane has its own time, step size and status; all of them go through the stages together.
 Nothing is allocated here and nothing raises: a lane that can't go on gets a status.
 
 Notation of Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I* (HNW),
 secs. II.4 and II.6: ``y`` and ``y1`` are the states before and after the step, ``k`` holds the
 stages one after the other, rows ``j * rows ... (j + 1) * rows - 1`` being stage j. The first stage
 of a step is the last of the one before; instead of a copy, the two change places (``first``).
-Behind the stages is room for the errors of the rows.
+Behind the stages is room for the errors of the rows. The arguments are in `arguments`.
 """
-
-from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
 
-from numba.core import types
+from numba import types
 
 from chimera_hpc.base.status import Status
+from chimera_hpc.integrate.arguments import Lanes, Limits, Method, Step
 from chimera_hpc.integrate.dense_output import sample
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.lane_rows import (
@@ -35,7 +33,7 @@ from chimera_hpc.integrate.lane_rows import (
     TIME_NEW,
     TRIED,
 )
-from chimera_hpc.integrate.simd import LANES, across, splat
+from chimera_hpc.integrate.simd import LANES, across, broadcast
 from chimera_hpc.integrate.stages import error_sum, last_stage_sum, stage_sum
 
 # PI control (HNW sec. IV.2): the next step is h * SAFETY * err**(-EXPONENT / order) *
@@ -50,59 +48,54 @@ _DONE = int(Status.DONE)
 
 _MATRIX = types.Array(types.float64, 2, "C")
 _VECTOR = types.Array(types.float64, 1, "C")
-RIGHT_HAND_SIDE = types.void(_MATRIX, _MATRIX, _MATRIX, types.Array(types.int64, 1, "C"))
+_INTEGERS = types.Array(types.int64, 1, "C")
+RIGHT_HAND_SIDE = types.void(_MATRIX, _MATRIX, _MATRIX, _INTEGERS)
 """Signature of a right-hand side: ``rhs(y, dy, lane_params, int_params)``."""
 
 
 @jit()
-def _scaled_norm(
-    a: Any, b: Any, weight: Any, y: Any, a0: Any, b0: Any, m: Any, size: Any, rtol: Any,
-    atol: Any,
-) -> Any:  # fmt: skip
-    # Norm of a - weight * b in the error scale of y, in lane m; a, b start at rows a0, b0.
+def _scaled_norm(rows, first, y, m, size, limits):
+    # Norm of ``size`` rows from ``first`` on in the error scale of y, in lane m.
     total = 0.0
     for i in range(size):
-        ratio = (a[a0 + i, m] - weight * b[b0 + i, m]) / (atol + rtol * abs(y[i, m]))
+        ratio = rows[first + i, m] / (limits.atol + limits.rtol * abs(y[i, m]))
         total += ratio * ratio
     return math.sqrt(total / size)
 
 
 @jit()
-def _start(
-    rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, first: Any, lane: Any, count: Any,
-    size: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
-) -> None:  # fmt: skip
+def _start(rhs, inputs, lanes, limits, order):
     # First derivative and first step size of the lanes just put in, HNW sec. II.4 ("Starting
     # step size"); the rows of the other lanes are not touched.
-    rows, lanes = y.shape
+    params, ints, size = inputs
+    y, y1, k, lane, count = lanes.y, lanes.y1, lanes.k, lanes.lane, lanes.counters
+    rows, n_lanes = y.shape
     s1, s2 = rows, 2 * rows
     rhs(y[:size], k[s1 : s1 + size], params, ints)
-    for m in range(lanes):
+    for m in range(n_lanes):
         if count[STATE, m] == FRESH:
-            for i in range(size):
-                k[first + i, m] = k[s1 + i, m]
-            d0 = _scaled_norm(y, y, 0.0, y, 0, 0, m, size, rtol, atol)
-            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, size, rtol, atol)
+            d0 = _scaled_norm(y, 0, y, m, size, limits)
+            d1 = _scaled_norm(k, s1, y, m, size, limits)
             h = 1e-6
             if d0 >= 1e-5 and d1 >= 1e-5:
                 h = 0.01 * d0 / d1
-            lane[STEP, m] = min(h, t_end)
-    for m in range(lanes):
-        if count[STATE, m] == FRESH:
-            h = lane[STEP, m]
+            lane[STEP, m] = h = min(h, limits.t_end)
             for i in range(size):
+                k[i, m] = k[s1 + i, m]
                 y1[i, m] = y[i, m] + h * k[s1 + i, m]
     rhs(y1[:size], k[s2 : s2 + size], params, ints)
-    for m in range(lanes):
+    for m in range(n_lanes):
         if count[STATE, m] == FRESH:
+            for i in range(size):
+                y1[i, m] = k[s2 + i, m] - k[i, m]
             h = lane[STEP, m]
-            d1 = _scaled_norm(k, y, 0.0, y, first, 0, m, size, rtol, atol)
-            d2 = _scaled_norm(k, k, 1.0, y, s2, s1, m, size, rtol, atol) / h
+            d1 = _scaled_norm(k, 0, y, m, size, limits)
+            d2 = _scaled_norm(y1, 0, y, m, size, limits) / h
             d = max(d1, d2)
             h1 = max(1e-6, h * 1e-3)
             if d > 1e-15:
                 h1 = (0.01 / d) ** (1.0 / (order + 1.0))
-            h = min(100.0 * h, h1, t_end)
+            h = min(100.0 * h, h1, limits.t_end)
             if not (h > 0.0):
                 h = 1e-6
             lane[STEP, m] = h
@@ -110,7 +103,7 @@ def _start(
 
 
 @jit()
-def _judge(lane: Any, count: Any, size: Any, t_end: Any) -> Any:
+def _judge(lane, count, size, t_end):
     # Accept or reject the step of each running lane; returns the number of lanes rejected.
     rejected = 0
     for m in range(lane.shape[1]):
@@ -134,8 +127,9 @@ def _judge(lane: Any, count: Any, size: Any, t_end: Any) -> Any:
 
 
 @jit()
-def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps: Any) -> None:
+def _next_step(lane, count, m, order, limits):
     # Move lane m on and choose its next step size, or end it.
+    t_end = limits.t_end
     log_error = lane[LOG_ERROR_NEW, m]
     if log_error <= 0.0:
         bounded = max(log_error, LOG_ERROR_FLOOR)
@@ -157,7 +151,7 @@ def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps:
     if count[STATE, m] == RUNNING:
         if h <= 1e-14 * max(abs(t), 1e-3):
             count[STATE, m] = _STEP_TOO_SMALL if math.isfinite(log_error) else _NON_FINITE
-        elif count[TRIED, m] >= max_steps:
+        elif count[TRIED, m] >= limits.max_steps:
             count[STATE, m] = _STEP_BUDGET
     # A step that would end just short of t_end is stretched to it: no sliver is left over.
     if t + 1.01 * h >= t_end:
@@ -166,111 +160,110 @@ def _next_step(lane: Any, count: Any, m: Any, order: Any, t_end: Any, max_steps:
 
 
 @jit()
-def _advance(
-    like: Any, rhs: Any, params: Any, ints: Any, y: Any, y1: Any, k: Any, weights: Any, lane: Any,
-    count: Any, size: Any, a: Any, e: Any, p: Any, order: Any, rtol: Any, atol: Any, t_end: Any,
-    max_steps: Any, start: Any, step: Any, samples: Any, iterations: Any,
-) -> Any:  # fmt: skip
-    rows, lanes = y.shape
-    units = rows // LANES if lanes == 1 else rows
-    zero = splat(0.0)
+def _undo(y, y1, k, first, last, m, size):
+    # A rejected step of lane m: state and slope at its end are those at its beginning.
+    for i in range(size):
+        y1[i, m] = y[i, m]
+        k[last + i, m] = k[first + i, m]
+
+
+@jit()
+def _copy(source, first, target):
+    # Rows of ``source`` from ``first`` on to ``target``, as many as those have.
+    for i in range(target.shape[0]):
+        for m in range(target.shape[1]):
+            target[i, m] = source[first + i, m]
+
+
+@jit()
+def _advance(like, rhs, inputs, lanes, method, limits, iterations):
+    params, ints, size = inputs
+    y, y1, k, lane, count = lanes.y, lanes.y1, lanes.k, lanes.lane, lanes.counters
+    a, e, order = method.a, method.e, method.order
+    rows, n_lanes = y.shape
+    units = rows // LANES if n_lanes == 1 else rows
+    zero = broadcast(0.0)
     stages = e.size
     first = 0
     n_fresh = 0
     n_running = 0
-    for m in range(lanes):
+    for m in range(n_lanes):
         n_fresh += count[STATE, m] == FRESH
         n_running += count[STATE, m] == RUNNING
     if n_fresh > 0:
-        _start(rhs, params, ints, y, y1, k, first, lane, count, size, order, rtol, atol, t_end)
+        _start(rhs, inputs, lanes, limits, order)
         n_running += n_fresh
     done = 0
     swapped = False
-    still = n_running
-    while done < iterations and still == n_running:
+    still_running = n_running
+    while done < iterations and still_running == n_running:
         h = across(like, lane, STEP)
         last = rows * (stages - 1) - first
-        first_unit = first * units // rows
+        step = Step(y, y1, k, first * units // rows, units)
         for s in range(1, stages - 1):
-            stage_sum(h, y, k, first_unit, units, a, s, y1)
+            stage_sum(h, step, a, s)
             rhs(y1[:size], k[s * rows : s * rows + size], params, ints)
-        last_stage_sum(h, y, k, first_unit, units, a, e, y1)
+        last_stage_sum(h, step, a, e)
         rhs(y1[:size], k[last : last + size], params, ints)
-        error_sum(zero, h, y, y1, k, first_unit, units, e, rtol, atol, lane)
-        rejected = _judge(lane, count, size, t_end)
-        sample(
-            like, h, y, k, first_unit, units, weights, lane, count, p, start, step, t_end,
-            samples,
-        )  # fmt: skip
+        error_sum(zero, h, step, e, limits, lane)
+        rejected = _judge(lane, count, size, limits.t_end)
+        sample(like, h, step, lanes, method.p, limits)
         if rejected > 0:
-            for m in range(lanes):
+            for m in range(n_lanes):
                 if count[STATE, m] == RUNNING and lane[LOG_ERROR_NEW, m] > 0.0:
-                    for i in range(size):
-                        y1[i, m] = y[i, m]
-                        k[last + i, m] = k[first + i, m]
-        still = 0
-        for m in range(lanes):
+                    _undo(y, y1, k, first, last, m, size)
+        still_running = 0
+        for m in range(n_lanes):
             if count[STATE, m] == RUNNING:
-                _next_step(lane, count, m, order, t_end, max_steps)
-                still += count[STATE, m] == RUNNING
+                _next_step(lane, count, m, order, limits)
+                still_running += count[STATE, m] == RUNNING
         y, y1 = y1, y
         swapped = not swapped
         first = last
         done += 1
     # Hand the state back where it came from.
     if swapped:
-        for i in range(rows):
-            for m in range(lanes):
-                y1[i, m] = y[i, m]
+        _copy(y, 0, y1)
     if first != 0:
-        for i in range(rows):
-            for m in range(lanes):
-                k[i, m] = k[first + i, m]
+        _copy(k, first, k[:rows])
     return done
 
 
+_REAL = types.float64
+_COUNT, _SAMPLES = types.Array(types.int64, 2, "C"), types.Array(_REAL, 3, "C")
+_LANES = types.NamedTuple((_MATRIX, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _COUNT, _SAMPLES), Lanes)
+_METHOD = types.NamedTuple((_MATRIX, _VECTOR, _MATRIX, _REAL), Method)
+_LIMITS = types.NamedTuple((_REAL, _REAL, _REAL, types.int64, _REAL, _REAL), Limits)
 _SIGNATURE = types.int64(
     types.FunctionType(RIGHT_HAND_SIDE),
-    *(_MATRIX, types.Array(types.int64, 1, "C")),
-    *(_MATRIX, _MATRIX, _MATRIX, _MATRIX),
-    *(_MATRIX, types.Array(types.int64, 2, "C"), types.int64),
-    *(_MATRIX, _VECTOR, _MATRIX),
-    *(types.float64, types.float64, types.float64, types.float64, types.int64),
-    *(types.float64, types.float64, types.Array(types.float64, 3, "C"), types.int64),
+    _MATRIX,
+    _INTEGERS,
+    _LANES,
+    _METHOD,
+    _LIMITS,
+    types.int64,
+    types.int64,
 )
 
 
-def _advance_one(  # type: ignore[no-untyped-def]
-    rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol, atol, t_end,
-    max_steps, start, step, samples, iterations,
-):  # fmt: skip
-    return _advance(
-        0.0, rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol, atol,
-        t_end, max_steps, start, step, samples, iterations,
-    )  # fmt: skip
+def _advance_one(rhs, params, ints, lanes, method, limits, size, iterations):
+    return _advance(0.0, rhs, (params, ints, size), lanes, method, limits, iterations)
 
 
-def _advance_pack(  # type: ignore[no-untyped-def]
-    rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol, atol, t_end,
-    max_steps, start, step, samples, iterations,
-):  # fmt: skip
-    return _advance(
-        splat(0.0), rhs, params, ints, y, y1, k, weights, lane, count, size, a, e, p, order, rtol,
-        atol, t_end, max_steps, start, step, samples, iterations,
-    )  # fmt: skip
+def _advance_vector(rhs, params, ints, lanes, method, limits, size, iterations):
+    like = broadcast(0.0)
+    return _advance(like, rhs, (params, ints, size), lanes, method, limits, iterations)
 
 
 @cache
-def advance(lanes: int) -> Any:
+def advance(lanes):
     """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
 
-    ``advance(lanes)(rhs, lane_params, int_params, y, y1, k, weights, lane, count, size, a, e, p,
-    order, rtol, atol, t_end, max_steps, start, step, samples, iterations)`` tries at
-    most ``iterations`` steps in every running lane and comes back as soon as a lane has ended; it
-    returns how many it tried. Lanes marked `FRESH` are started first: first derivative, first step
-    size. ``samples`` (lanes, samples, width) begins on a cache line and ``width`` is a multiple of
-    `LANES`; ``weights`` (2 stages, `LANES`) is room for what two samples are made with.
+    ``advance(n)(rhs, params, ints, lanes, method, limits, size, iterations)`` tries at most
+    ``iterations`` steps in every running lane and returns as soon as a lane has ended; it returns
+    how many it tried. Lanes marked `FRESH` are started first: first derivative, first step size.
+    ``size`` is the number of rows of the state that the right-hand side sees.
     """
     if lanes not in (1, LANES):
         raise ValueError(f"the stepping loop is compiled for 1 and {LANES} lanes, not {lanes}")
-    return jit(_SIGNATURE)(_advance_one if lanes == 1 else _advance_pack)
+    return jit(_SIGNATURE)(_advance_one if lanes == 1 else _advance_vector)

@@ -10,6 +10,8 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from chimera_hpc.base.errors import BadInput
+
 if TYPE_CHECKING:
     from chimera_hpc.integrate.tableau import Tableau
 
@@ -22,10 +24,11 @@ MODELS = {
 METHODS = {
     "tsit5": "chimera_hpc.integrate.tsit5:TSIT5",
     "dopri5": "chimera_hpc.integrate.dopri5:DOPRI5",
-    "verner6": "chimera_hpc.integrate.verner6:VERNER6",
-    "kcl4": "chimera_hpc.integrate.kcl4:KCL4",
 }
 """Runge-Kutta pairs: `integrate.tableau.Tableau`."""
+
+REMOVED_METHODS = {"verner6": "tsit5", "kcl4": "tsit5"}
+"""Pairs of version 0.1, which a store may name, and what to use instead."""
 
 ANALYSES = {
     "networks": "chimera_hpc.reduction.analyses.ring:networks",
@@ -82,6 +85,15 @@ def load(place: str) -> Any:
 
 
 def method(name: str) -> Tableau:
-    """Return the Runge-Kutta pair of this name."""
+    """Return the Runge-Kutta pair of this name.
+
+    Raises
+    ------
+    BadInput
+        The pair was removed.
+    """
+    if name in REMOVED_METHODS:
+        instead = REMOVED_METHODS[name]
+        raise BadInput(f'method "{name}" was removed in version 0.2: use "{instead}"')
     found: Tableau = load(METHODS[name])
     return found

@@ -21,8 +21,10 @@ from pydantic import (
 )
 
 from chimera_hpc.base import renaming
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.renaming import with_new_names
 from chimera_hpc.base.wording import short
+from chimera_hpc.job import registry
 from chimera_hpc.job.axes import Axis, Values
 from chimera_hpc.job.checks import (
     Grid,
@@ -104,7 +106,14 @@ class Sweep(Table):
             look_in(folder)
         data = apply_overrides(_with_new_names(data, "features."), overrides)
         settings = "".join(f" --set {short(override)}" for override in overrides)
-        return cls.from_dict(data, where=f"{where} with{settings}" if settings else where)
+        where = f"{where} with{settings}" if settings else where
+        sweep = cls.from_dict(data, where=where)
+        try:
+            # A store may still name a method that was removed; a job may not.
+            registry.method(sweep.integrator.method)
+        except BadInput as error:
+            raise BadInput(f"{where}: integrator.{error}") from None
+        return sweep
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "sweep") -> Self:

@@ -16,7 +16,7 @@ from pydantic import (
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.job.registry import METHODS
+from chimera_hpc.job.registry import METHODS, REMOVED_METHODS
 from chimera_hpc.job.selection import check_analyses, check_figures, check_selections
 
 
@@ -50,7 +50,7 @@ def _different(value: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _known_method(value: str) -> str:
-    if value not in METHODS:
+    if value not in METHODS and value not in REMOVED_METHODS:
         raise BadInput(
             f"integrator.method: {short(value)} is unknown{nearest(value, list(METHODS))}"
         )
@@ -85,8 +85,7 @@ class Integrator(Table):
 
     method: Annotated[str, AfterValidator(_known_method)] = Field(
         "tsit5",
-        description="Runge-Kutta pair: of order 5 (tsit5, the paper's; dopri5), 6 (verner6), "
-        "4 (kcl4, a low-storage pair).",
+        description="Runge-Kutta pair of order 5: tsit5 (the paper's) or dopri5.",
         json_schema_extra={"enum": list(METHODS)},
     )
     form: Literal["reduced", "full"] = Field(

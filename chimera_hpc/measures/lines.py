@@ -12,24 +12,24 @@ when that is less than the largest line. The bin found is the one of the full tr
 its cost at window lengths with large prime factors. (Where broadband noise holds more energy than
 the line, the search goes through all bins: the same answer at 10 to 20 times the cost.)
 
-Sums run in LANES independent lanes, in one fixed order: the same bits everywhere.
+Sums run as SUMS independent partial sums, in one fixed order: the same bits everywhere.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.integrate.jit import jit
-from chimera_hpc.integrate.simd import LANES as PACK
-from chimera_hpc.integrate.simd import fold, load_at, splat, store_at
+from chimera_hpc.integrate.simd import LANES, broadcast, fold, load_at, store_at
 
-LANES = 16
+# Partial sums that run side by side, in two vectors.
+SUMS = 2 * LANES
 ROWS = 4
-BLOCK = LANES * ROWS
+BLOCK = SUMS * ROWS
 # Bins whose rotations are kept at hand: the signals of a ring share their windows.
 SLOTS = 8
 
@@ -47,8 +47,8 @@ class Work(NamedTuple):
     z: NDArray[np.float64]  # centred samples, zero-padded to whole blocks
     z_s: NDArray[np.float64]  # the same times s, the place from the middle; for the sine fit
     power: NDArray[np.float64]  # |X_k|^2
-    turn: NDArray[np.float64]  # (SLOTS + 1, 3, LANES), see `_begin_turning`
-    sums: NDArray[np.float64]  # (LANES,)
+    turn: NDArray[np.float64]  # (SLOTS + 1, 3, SUMS), see `_begin_turning`
+    sums: NDArray[np.float64]  # (SUMS,)
 
 
 def work_arrays(longest: int) -> Work:
@@ -58,13 +58,13 @@ def work_arrays(longest: int) -> Work:
         np.empty(padded),
         np.empty(padded),
         np.empty(longest // 2 + 2),
-        np.zeros((SLOTS + 1, 3, LANES)),
-        np.empty(LANES),
+        np.zeros((SLOTS + 1, 3, SUMS)),
+        np.empty(SUMS),
     )
 
 
 @jit()
-def centre(x: Any, first: int, n: int, z: Any, sums: Any) -> tuple[float, float, float]:
+def centre(x, first, n, z, sums):
     """Write x[first:first+n] minus its mean into z; return mean, energy, alternating sum.
 
     The energy is sum z_i^2 and the alternating sum is sum (-1)^i x_i, the Nyquist bin for even n
@@ -75,64 +75,64 @@ def centre(x: Any, first: int, n: int, z: Any, sums: Any) -> tuple[float, float,
     whole = n // BLOCK * BLOCK
     for i in range(whole, padded):
         z[i] = x[first + i] - origin if i < n else 0.0
-    low, high = splat(0.0), splat(0.0)
+    low, high = broadcast(0.0), broadcast(0.0)
     for start in range(0, padded, BLOCK):
         if start < whole:
-            for i in range(start, start + BLOCK, PACK):
+            for i in range(start, start + BLOCK, LANES):
                 store_at(z, i, load_at(x, first + i) - origin)
         low = low + _four_rows(z, start)
-        high = high + _four_rows(z, start + PACK)
+        high = high + _four_rows(z, start + LANES)
     store_at(sums, 0, low)
-    store_at(sums, PACK, high)
+    store_at(sums, LANES, high)
     total, alternating = 0.0, 0.0
-    for b in range(0, LANES, 2):
+    for b in range(0, SUMS, 2):
         total += sums[b] + sums[b + 1]
         alternating += sums[b] - sums[b + 1]
     mean = total / n
 
     for i in range(whole, n):
         z[i] -= mean
-    low, high = splat(0.0), splat(0.0)
+    low, high = broadcast(0.0), broadcast(0.0)
     for start in range(0, padded, BLOCK):
         if start < whole:
-            for i in range(start, start + BLOCK, PACK):
+            for i in range(start, start + BLOCK, LANES):
                 store_at(z, i, load_at(z, i) - mean)
         low = low + _four_squares(z, start)
-        high = high + _four_squares(z, start + PACK)
+        high = high + _four_squares(z, start + LANES)
     store_at(sums, 0, low)
-    store_at(sums, PACK, high)
+    store_at(sums, LANES, high)
     energy = 0.0
-    for b in range(LANES):
+    for b in range(SUMS):
         energy += sums[b]
     return origin + mean, energy, alternating
 
 
 @jit()
-def _four_rows(z: Any, start: int) -> Any:
-    y0, y1 = load_at(z, start), load_at(z, start + LANES)
-    y2, y3 = load_at(z, start + 2 * LANES), load_at(z, start + 3 * LANES)
+def _four_rows(z, start):
+    y0, y1 = load_at(z, start), load_at(z, start + SUMS)
+    y2, y3 = load_at(z, start + 2 * SUMS), load_at(z, start + 3 * SUMS)
     return (y0 + y1) + (y2 + y3)
 
 
 @jit()
-def _four_squares(z: Any, start: int) -> Any:
-    y0, y1 = load_at(z, start), load_at(z, start + LANES)
-    y2, y3 = load_at(z, start + 2 * LANES), load_at(z, start + 3 * LANES)
+def _four_squares(z, start):
+    y0, y1 = load_at(z, start), load_at(z, start + SUMS)
+    y2, y3 = load_at(z, start + 2 * SUMS), load_at(z, start + 3 * SUMS)
     return (y0 * y0 + y1 * y1) + (y2 * y2 + y3 * y3)
 
 
 @jit()
-def _weighted(z: Any, start: int, a0: float, a1: float, a2: float, a3: float) -> Any:
-    y0, y1 = load_at(z, start), load_at(z, start + LANES)
-    y2, y3 = load_at(z, start + 2 * LANES), load_at(z, start + 3 * LANES)
+def _weighted(z, start, a0, a1, a2, a3):
+    y0, y1 = load_at(z, start), load_at(z, start + SUMS)
+    y2, y3 = load_at(z, start + 2 * SUMS), load_at(z, start + 3 * SUMS)
     return (y0 * a0 + y1 * a1) + (y2 * a2 + y3 * a3)
 
 
 @jit()
-def line_sums(z: Any, n: int, w: float, turn: Any) -> tuple[float, float]:
+def line_sums(z, n, w, turn):
     """C = sum z_i cos(w i) and S = sum z_i sin(w i), i = 0 .. n-1.
 
-    With i = LANES a + b and the addition theorem, only cos and sin of w b and of w LANES a are
+    With i = SUMS a + b and the addition theorem, only cos and sin of w b and of w SUMS a are
     needed, which come from one cosine and one sine by rotations.
     """
     _begin_turning(w, turn[SLOTS])
@@ -141,7 +141,7 @@ def line_sums(z: Any, n: int, w: float, turn: Any) -> tuple[float, float]:
 
 
 @jit()
-def _turning_sums(z: Any, n: int, turn: Any) -> tuple[float, float]:
+def _turning_sums(z, n, turn):
     c, s = turn[2, 0], turn[2, 1]
     # (c_r, s_r) is the angle of row r of a block; (c, s) turns by one row, (c4, s4) by a block
     c2, s2 = c * c - s * s, 2.0 * c * s
@@ -149,31 +149,31 @@ def _turning_sums(z: Any, n: int, turn: Any) -> tuple[float, float]:
     c0, s0 = 1.0, 0.0
     c1, s1 = c, s
     c3, s3 = c2 * c - s2 * s, s2 * c + c2 * s
-    p_low, p_high, q_low, q_high = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    p_low, p_high, q_low, q_high = broadcast(0.0), broadcast(0.0), broadcast(0.0), broadcast(0.0)
     for start in range(0, n, BLOCK):
         p_low = p_low + _weighted(z, start, c0, c1, c2, c3)
         q_low = q_low + _weighted(z, start, s0, s1, s2, s3)
-        p_high = p_high + _weighted(z, start + PACK, c0, c1, c2, c3)
-        q_high = q_high + _weighted(z, start + PACK, s0, s1, s2, s3)
+        p_high = p_high + _weighted(z, start + LANES, c0, c1, c2, c3)
+        q_high = q_high + _weighted(z, start + LANES, s0, s1, s2, s3)
         c0, s0 = c0 * c4 - s0 * s4, s0 * c4 + c0 * s4
         c1, s1 = c1 * c4 - s1 * s4, s1 * c4 + c1 * s4
         c2, s2 = c2 * c4 - s2 * s4, s2 * c4 + c2 * s4
         c3, s3 = c3 * c4 - s3 * s4, s3 * c4 + c3 * s4
-    co_low, co_high = load_at(turn, 0), load_at(turn, PACK)
-    si_low, si_high = load_at(turn, LANES), load_at(turn, LANES + PACK)
+    co_low, co_high = load_at(turn, 0), load_at(turn, LANES)
+    si_low, si_high = load_at(turn, SUMS), load_at(turn, SUMS + LANES)
     along = (p_low * co_low - q_low * si_low) + (p_high * co_high - q_high * si_high)
     across = (p_low * si_low + q_low * co_low) + (p_high * si_high + q_high * co_high)
     return fold(along), fold(across)
 
 
 @jit()
-def _begin_turning(w: float, turn: Any) -> None:
-    """Write cos and sin of w b, b < LANES, into turn[0] and turn[1], of w LANES into turn[2]."""
+def _begin_turning(w, turn):
+    """Write cos and sin of w b, b < SUMS, into turn[0] and turn[1], of w SUMS into turn[2]."""
     co, si = turn[0], turn[1]
     c, s = math.cos(w), math.sin(w)
     co[0], si[0] = 1.0, 0.0
     m = 1
-    while m < LANES:
+    while m < SUMS:
         for b in range(m):
             co[m + b] = co[b] * c - si[b] * s
             si[m + b] = si[b] * c + co[b] * s
@@ -183,7 +183,7 @@ def _begin_turning(w: float, turn: Any) -> None:
 
 
 @jit()
-def _bin_power(z: Any, n: int, k: int, turn: Any) -> float:
+def _bin_power(z, n, k, turn):
     """|X_k|^2 of the discrete Fourier transform of z."""
     # Beside the rotations stands which length and bin they belong to.
     mine = turn[k % SLOTS]
@@ -197,14 +197,14 @@ def _bin_power(z: Any, n: int, k: int, turn: Any) -> float:
 
 @jit()
 def dominant_bin(
-    z: Any,
-    n: int,
-    energy: float,
-    alternating: float,
-    guess: int,
-    power: Any,
-    turn: Any,
-) -> int:
+    z,
+    n,
+    energy,
+    alternating,
+    guess,
+    power,
+    turn,
+):
     """Bin k >= 1 with the largest |X_k|, the lowest of equal ones; fills power[k-1 : k+2].
 
     The bins are searched outwards from `guess` until the energy left can't hold a larger line
@@ -242,7 +242,7 @@ def dominant_bin(
 
 
 @jit()
-def parabola_shift(power: Any, k: int, n: int) -> float:
+def parabola_shift(power, k, n):
     """Distance, in bins, from bin k to the vertex of the parabola through bins k-1, k, k+1.
 
     The parabola goes through the amplitudes |X|. At the edges of the spectrum (bin 1, whose lower
@@ -258,13 +258,13 @@ def parabola_shift(power: Any, k: int, n: int) -> float:
 
 
 @jit()
-def _kernel_sum(n: int, w: float) -> float:
+def _kernel_sum(n, w):
     """Sum of cos(w s) over s = -(n-1)/2 .. (n-1)/2, the Dirichlet kernel."""
     return math.sin(0.5 * n * w) / math.sin(0.5 * w)
 
 
 @jit()
-def fit_at(z: Any, n: int, w: float, turn: Any) -> tuple[float, float, float, float, float]:
+def fit_at(z, n, w, turn):
     """Least squares of A cos(w s) + B sin(w s) + K to the centred samples, 0 < w < pi.
 
     s = i - (n-1)/2 counts from the middle of the window: there the sine decouples from the other
@@ -284,7 +284,7 @@ def fit_at(z: Any, n: int, w: float, turn: Any) -> tuple[float, float, float, fl
 
 
 @jit()
-def _newton_step(z_s: Any, n: int, w: float, a: float, b: float, k: float, turn: Any) -> float:
+def _newton_step(z_s, n, w, a, b, k, turn):
     """Gauss-Newton step in w of the four-parameter sine fit; z_s holds s z.
 
     It is the coefficient of the model's derivative d = s (B cos(w s) - A sin(w s)) in the least
@@ -316,7 +316,7 @@ def _newton_step(z_s: Any, n: int, w: float, a: float, b: float, k: float, turn:
 
 
 @jit()
-def _kernel_derivatives(n: int, w: float) -> tuple[float, float, float]:
+def _kernel_derivatives(n, w):
     """Dirichlet kernel and its first two derivatives with respect to w."""
     c, s = math.cos(0.5 * w), math.sin(0.5 * w)
     value = math.sin(0.5 * n * w) / s
@@ -326,7 +326,7 @@ def _kernel_derivatives(n: int, w: float) -> tuple[float, float, float]:
 
 
 @jit()
-def sine_fit(z: Any, z_s: Any, n: int, energy: float, w: float, turn: Any) -> float:
+def sine_fit(z, z_s, n, energy, w, turn):
     """Angular frequency of the four-parameter sine fit (IEEE Std 1057), started at w.
 
     Gauss-Newton steps, halved as long as they explain less of the energy; they stay within one
@@ -357,7 +357,7 @@ def sine_fit(z: Any, z_s: Any, n: int, energy: float, w: float, turn: Any) -> fl
 
 
 @jit()
-def window_line(x: Any, first: int, n: int, guess: int, refine: bool, work: Any, out: Any) -> int:
+def window_line(x, first, n, guess, refine: bool, work, out):
     """Amplitude, angular frequency a sample, phase at the first sample, baseline into out (4,).
 
     Samples that are all equal have amplitude, frequency and phase 0. Returns the dominant bin,

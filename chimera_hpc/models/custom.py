@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.integrate.jit import compile_anew
+from chimera_hpc.integrate.jit import compile_uncached
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
 from chimera_hpc.models.parameters import Limit, ModelParameters, Parameter
 
@@ -54,7 +54,7 @@ class OwnModel:
     right_hand_side : function (y, dy, p, ints)
         ``y``, ``dy`` (n_variables * n_nodes, lanes) and ``p`` (n_p, lanes) are float64, ``ints`` is
         int64. It fills all of ``dy`` and changes nothing else. A function that is jitted already is
-        compiled anew from its source.
+        compiled again from its source.
     variables : sequence of str
         Names of the variables of a node.
     parameters : sequence of Parameter
@@ -154,13 +154,13 @@ class OwnModel:
         """
         for helper in _helpers(self.function):
             # numba looks at the date of the helper's own file, not at what the helper calls.
-            if type(helper._cache).__name__ != "NullCache":
+            if helper.stats.cache_path is not None:
                 raise BadInput(
                     f"right_hand_side calls {helper.__name__}, which is compiled with cache=True: "
                     "leave that out, or an edit may go unnoticed"
                 )
         try:
-            return compile_anew(RIGHT_HAND_SIDE, self.function)
+            return compile_uncached(RIGHT_HAND_SIDE, self.function)
         except Exception as error:
             # Whatever numba says of the user's code.
             raise BadInput(f"right_hand_side does not compile: {_in_short(error)}") from None
@@ -270,7 +270,7 @@ def _helpers(function: Any, known: set[int] | None = None) -> Iterator[Any]:
     known = set() if known is None else known
     names = inspect.getclosurevars(function)
     for value in (*names.globals.values(), *names.nonlocals.values()):
-        if hasattr(value, "py_func") and hasattr(value, "_cache") and id(value) not in known:
+        if hasattr(value, "py_func") and hasattr(value, "stats") and id(value) not in known:
             known.add(id(value))
             yield value
             yield from _helpers(value.py_func, known)

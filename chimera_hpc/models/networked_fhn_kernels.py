@@ -1,26 +1,24 @@
 """Compiled right-hand side of the networked FitzHugh-Nagumo model."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import Any
 
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.simd import (
     LANES,
-    fetch,
+    broadcast,
     fma,
     last_of,
     load,
     load_at,
     load_some,
-    splat,
+    prefetch,
     store,
     store_at,
     store_some,
 )
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
 from chimera_hpc.models.window_sums import (
+    Ring,
     changes_along,
     first_across,
     first_along,
@@ -30,34 +28,34 @@ from chimera_hpc.models.window_sums import (
 
 THIRD = 1.0 / 3.0
 AHEAD = 16
-"""Nodes between the one worked on and the one whose slopes are fetched into the first cache: the
-processor foresees by itself what will be read, but not what will be written only."""
+"""Slopes are prefetched this many nodes ahead: the processor predicts what will be read, but not
+what will only be written."""
 
 
 @jit()
-def _activator(x: Any, y: Any, pull_x: Any, pull_y: Any, numbers: Any) -> Any:
+def _activator(x, y, pull_x, pull_y, numbers):
     rate, _, same, cross = numbers
     pull = fma(cross, pull_y, same * pull_x)
     return fma(x, fma(x * x, -THIRD, 1.0), pull - y) * rate
 
 
 @jit()
-def _inhibitor(x: Any, pull_x: Any, pull_y: Any, numbers: Any) -> Any:
+def _inhibitor(x, pull_x, pull_y, numbers):
     _, b, same, cross = numbers
     return fma(same, pull_y, fma(-1.0 * cross, pull_x, x + b))
 
 
 @jit()
-def _keep(zero: Any, i: Any, total_y: Any, context: Any) -> None:
+def _keep(zero, i, total_y, context):
     _, slopes, n, _, _ = context
     store(slopes, n + i, total_y)
 
 
 @jit()
-def _node(zero: Any, i: Any, total_x: Any, context: Any) -> None:
+def _node(zero, i, total_x, context):
     state, slopes, n, width, numbers = context
-    fetch(zero, slopes, i + AHEAD)
-    fetch(zero, slopes, n + i + AHEAD)
+    prefetch(zero, slopes, i + AHEAD)
+    prefetch(zero, slopes, n + i + AHEAD)
     x, y = load(zero, state, i), load(zero, state, n + i)
     pull_x = fma(-width, x, total_x)
     pull_y = fma(-width, y, load(zero, slopes, n + i))
@@ -66,7 +64,7 @@ def _node(zero: Any, i: Any, total_x: Any, context: Any) -> None:
 
 
 @jit()
-def _across(zero: Any, state: Any, slopes: Any, params: Any, ints: Any) -> None:
+def _across(zero, state, slopes, params, ints):
     # Node by node, in all lanes together; the sums of y wait in the place of y's slopes.
     n, half = ints[0], ints[1]
     numbers = (
@@ -76,25 +74,26 @@ def _across(zero: Any, state: Any, slopes: Any, params: Any, ints: Any) -> None:
         load(zero, params, 3),
     )
     context = (state, slopes, n, 2.0 * half + 1.0, numbers)
-    total_x = first_across(zero, state, 0, n, half)
-    total_y = first_across(zero, state, n, n, half)
+    ring_x, ring_y = Ring(state, 0, n, half), Ring(state, n, n, half)
+    total_x, total_y = first_across(zero, ring_x), first_across(zero, ring_y)
     for i in range(0, n - LANES + 1, LANES):
-        total_y = stride_across(zero, state, n, n, half, total_y, i, _keep, context)
-        total_x = stride_across(zero, state, 0, n, half, total_x, i, _node, context)
-    rest_across(zero, state, n, n, half, total_y, _keep, context)
-    rest_across(zero, state, 0, n, half, total_x, _node, context)
+        total_y = stride_across(zero, ring_y, total_y, i, _keep, context)
+        total_x = stride_across(zero, ring_x, total_x, i, _node, context)
+    rest_across(zero, ring_y, total_y, _keep, context)
+    rest_across(zero, ring_x, total_x, _node, context)
 
 
 @jit()
-def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
+def _along(state, slopes, params, ints):
     # One trajectory, eight nodes at a time.
     n, half = ints[0], ints[1]
     numbers = (params[0, 0], params[1, 0], params[2, 0], params[3, 0])
     width = 2.0 * half + 1.0
-    before_x, before_y = first_along(state, 0, n, half), first_along(state, n, n, half)
+    ring_x, ring_y = Ring(state, 0, n, half), Ring(state, n, n, half)
+    before_x, before_y = first_along(ring_x), first_along(ring_y)
     for i in range(0, n, LANES):
-        change_x = changes_along(state, 0, n, half, i)
-        change_y = changes_along(state, n, n, half, i)
+        change_x = changes_along(ring_x, i)
+        change_y = changes_along(ring_y, i)
         left = n - i
         x = load_at(state, i) if left >= LANES else load_some(state, i, 0, left)
         y = load_at(state, n + i) if left >= LANES else load_some(state, n + i, 0, left)
@@ -111,10 +110,10 @@ def _along(state: Any, slopes: Any, params: Any, ints: Any) -> None:
         before_x, before_y = before_x + last_of(change_x), before_y + last_of(change_y)
 
 
-def networked_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
+def networked_rhs(y, dy, lane_params, int_params):
     """Right-hand side; ``lane_params`` rows: 1/epsilon, b, sigma/2P times cos and sin of phi."""
     if y.shape[1] == LANES:
-        _across(splat(0.0), y, dy, lane_params, int_params)
+        _across(broadcast(0.0), y, dy, lane_params, int_params)
     elif int_params[0] >= LANES:
         _along(y, dy, lane_params, int_params)
     else:
@@ -122,6 +121,6 @@ def networked_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-de
 
 
 @cache
-def compiled() -> Any:
+def compiled():
     """Return the compiled right-hand side."""
     return jit(RIGHT_HAND_SIDE)(networked_rhs)

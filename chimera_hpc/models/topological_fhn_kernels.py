@@ -1,25 +1,23 @@
 """Compiled right-hand sides of the topological FitzHugh-Nagumo model on a ring."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import Any
 
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.simd import (
     LANES,
+    broadcast,
     fma,
     last_of,
     load,
     load_at,
     load_some,
-    splat,
     store,
     store_at,
     store_some,
 )
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
 from chimera_hpc.models.window_sums import (
+    Ring,
     changes_along,
     first_across,
     first_along,
@@ -31,13 +29,13 @@ THIRD = 1.0 / 3.0
 
 
 @jit()
-def _activator(u: Any, w: Any, rate: Any) -> Any:
+def _activator(u, w, rate):
     # With the signs turned: (u^3 / 3 - u + w) * -rate.
     return fma(u, fma(u * u, THIRD, -1.0), w) * (-1.0 * rate)
 
 
 @jit()
-def _recovery(u: Any, w: Any, source: Any, total: Any, width: Any, c: Any) -> Any:
+def _recovery(u, w, source, total, width, c):
     return fma(c, w, source) - fma(-width, u, total)
 
 
@@ -45,7 +43,7 @@ def _recovery(u: Any, w: Any, source: Any, total: Any, width: Any, c: Any) -> An
 
 
 @jit()
-def _node(zero: Any, i: Any, total: Any, context: Any) -> None:
+def _node(zero, i, total, context):
     y, dy, params, n, width, c, rate = context
     u, w = load(zero, y, i), load(zero, y, n + i)
     store(dy, i, _activator(u, w, rate))
@@ -53,26 +51,28 @@ def _node(zero: Any, i: Any, total: Any, context: Any) -> None:
 
 
 @jit()
-def _reduced_across(zero: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
+def _reduced_across(zero, y, dy, params, ints):
     # Node by node, in all lanes together.
     n, half = ints[0], ints[1]
     rate, c = load(zero, params, 0), load(zero, params, 1)
     context = (y, dy, params, n, 2.0 * half + 1.0, c, rate)
-    total = first_across(zero, y, 0, n, half)
+    ring = Ring(y, 0, n, half)
+    total = first_across(zero, ring)
     for i in range(0, n - LANES + 1, LANES):
-        total = stride_across(zero, y, 0, n, half, total, i, _node, context)
-    rest_across(zero, y, 0, n, half, total, _node, context)
+        total = stride_across(zero, ring, total, i, _node, context)
+    rest_across(zero, ring, total, _node, context)
 
 
 @jit()
-def _reduced_along(y: Any, dy: Any, params: Any, ints: Any) -> None:
+def _reduced_along(y, dy, params, ints):
     # One trajectory, eight nodes at a time.
     n, half = ints[0], ints[1]
     rate, c = params[0, 0], params[1, 0]
     width = 2.0 * half + 1.0
-    before = first_along(y, 0, n, half)
+    ring = Ring(y, 0, n, half)
+    before = first_along(ring)
     for i in range(0, n, 8):
-        x = changes_along(y, 0, n, half, i)
+        x = changes_along(ring, i)
         total = before + x
         before = before + last_of(x)
         if i + 8 <= n:
@@ -88,7 +88,7 @@ def _reduced_along(y: Any, dy: Any, params: Any, ints: Any) -> None:
 
 
 @jit()
-def _full(like: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
+def _full(like, y, dy, params, ints):
     # Rows of y: u (n), then v of link i * P + (k - 1) between i and i + k; its orientation is the
     # sign in params: +1 when i is the tail.
     n, half = ints[0], ints[1]
@@ -110,25 +110,25 @@ def _full(like: Any, y: Any, dy: Any, params: Any, ints: Any) -> None:
         store(dy, i, load(like, dy, i) * rate)
 
 
-def reduced_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
+def reduced_rhs(y, dy, lane_params, int_params):
     """Right-hand side of the reduced form; ``lane_params`` rows: 1/epsilon, c, b s_1 ... b s_N."""
     if y.shape[1] == LANES:
-        _reduced_across(splat(0.0), y, dy, lane_params, int_params)
+        _reduced_across(broadcast(0.0), y, dy, lane_params, int_params)
     elif int_params[0] >= LANES:
         _reduced_along(y, dy, lane_params, int_params)
     else:
         _reduced_across(0.0, y, dy, lane_params, int_params)
 
 
-def full_rhs(y, dy, lane_params, int_params):  # type: ignore[no-untyped-def]
+def full_rhs(y, dy, lane_params, int_params):
     """Right-hand side of the node-link form; ``lane_params`` rows: 1/epsilon, b, c, link signs."""
     if y.shape[1] == LANES:
-        _full(splat(0.0), y, dy, lane_params, int_params)
+        _full(broadcast(0.0), y, dy, lane_params, int_params)
     else:
         _full(0.0, y, dy, lane_params, int_params)
 
 
 @cache
-def compiled(form: str) -> Any:
+def compiled(form: str):
     """Return the compiled right-hand side of a form, "reduced" or "full"."""
     return jit(RIGHT_HAND_SIDE)(reduced_rhs if form == "reduced" else full_rhs)

@@ -232,11 +232,12 @@ def warm_up(sweep: Sweep, points: Points) -> None:
 
     Called once before workers start, so that they find everything compiled.
     """
+    tableau = method(sweep.integrator.method)
     model = build(sweep, points.row(0))
     with stepping_loops_beside():
         _warm_up_the_rest(sweep, model)
     state = model.state(*initial_state(sweep, points.row(0), model))
-    control = Control(t_end=0.02, start=0.0, step=0.01, method=method(sweep.integrator.method))
+    control = Control(t_end=0.02, start=0.0, step=0.01, method=tableau)
     for lanes in (1, LANES):
         integrate([model], [state], control, model.n_rows, lambda *_: None, lanes=lanes)
 

@@ -57,7 +57,7 @@ def _check_shapes(sweep: Sweep, row: Row, model: Model) -> None:
 
 
 def _check_right_hand_side(model: Model, state: Array) -> None:
-    """Try it on one lane and on a pack of different ones: each must have the numbers it has alone.
+    """Try it on one lane and on `LANES` different ones: each must have the numbers it has alone.
 
     A lane that reads another's parameters, or vector functions that round otherwise than those for
     single numbers, would make results depend on the neighbours.

@@ -123,7 +123,7 @@ def simulate(
         model = system
     first = _vector("u0", u0, model.n_nodes)
     second = _vector("v0", v0, model.n_second)
-    if method not in registry.METHODS:
+    if method not in registry.METHODS | registry.REMOVED_METHODS:
         raise BadInput(f"method = {method!r}: allowed are {', '.join(registry.METHODS)}")
     tableau = registry.method(method)
     control = Control(t_end, t_start, t_step, rtol, atol, tableau, max_steps, time_out)

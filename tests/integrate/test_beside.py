@@ -85,7 +85,7 @@ def test_no_process_beside_where_it_is_of_no_use(
 ) -> None:
     if reason == "compiled":
         (folder / "integrate_0").mkdir()
-        (folder / "integrate_0" / "stepper._advance_pack-1.py311.1.nbc").touch()
+        (folder / "integrate_0" / "stepper._advance_vector-1.py311.1.nbc").touch()
     elif reason == "one core":
         monkeypatch.setattr(beside, "usable_cores", lambda: 1)
     else:
@@ -104,5 +104,5 @@ def test_first_warm_up_compiles_no_stepping_loop_itself(tmp_path: Path) -> None:
     compiled = json.loads(done.stdout)
     assert "reduced_rhs" in compiled
     assert [name for name in compiled if "advance" in name] == []
-    for name in ("_advance_one", "_advance_pack"):
+    for name in ("_advance_one", "_advance_vector"):
         assert any(tmp_path.glob(f"*/*/kernel.{name}-*.nbc"))

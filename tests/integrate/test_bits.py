@@ -1,4 +1,4 @@
-"""A trajectory has the same bits in any lane, beside any neighbours, alone or in a pack."""
+"""A trajectory has the same bits in any lane, beside any neighbours, alone or among others."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kernel_tools import run_all
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate import lane_rows as K
-from chimera_hpc.integrate.lanes import Control, Lanes
+from chimera_hpc.integrate.lanes import Control, LanePool
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.models.networked_fhn import NetworkedFHN
 from chimera_hpc.models.topological_fhn import TopologicalFHN
@@ -66,7 +66,7 @@ REDUCED = FAMILIES["reduced"]
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_a_pack_gives_the_bits_of_single_lanes(name):
+def test_a_vector_gives_the_bits_of_single_lanes(name):
     assert len(set(ALONE[name])) == N_RUNS
     assert bits_of(FAMILIES[name], lanes=LANES) == ALONE[name]
     assert bits_of(FAMILIES[name], lanes=1) == ALONE[name]
@@ -81,16 +81,16 @@ def test_order_and_company_do_not_matter(order, n):
 
 
 @pytest.mark.parametrize("lane", range(LANES))
-def test_position_in_the_pack_does_not_matter(lane):
+def test_position_in_the_vector_does_not_matter(lane):
     model, y0 = REDUCED[4]
-    pool = Lanes(LANES, model, CONTROL, model.n_rows)
+    pool = LanePool(LANES, model, CONTROL, model.n_rows)
     pool.put(lane, y0, model.lane_params)
-    while pool.count[K.STATE, lane] in (K.FRESH, K.RUNNING):
+    while pool.lanes.counters[K.STATE, lane] in (K.FRESH, K.RUNNING):
         pool.run()
     status, steps, n_sampled, y_end, samples = ALONE["reduced"][4]
-    assert pool.count[K.STATE, lane] == status
-    assert pool.count[K.ACCEPTED, lane] == steps
-    assert pool.y[: pool.size, lane].tobytes() == y_end
+    assert pool.lanes.counters[K.STATE, lane] == status
+    assert pool.lanes.counters[K.ACCEPTED, lane] == steps
+    assert pool.lanes.y[: pool.size, lane].tobytes() == y_end
     assert pool.sampled(lane)[:, :n_sampled].tobytes() == samples
 
 
@@ -119,12 +119,12 @@ def test_a_neighbour_that_fails_changes_no_bit(trouble):
 def test_length_of_a_call_of_the_loop_does_not_matter(iterations):
     # Between two calls the state is copied back to where it came from.
     model, y0 = REDUCED[6]
-    pool = Lanes(1, model, CONTROL, model.n_rows)
+    pool = LanePool(1, model, CONTROL, model.n_rows)
     pool.put(0, y0, model.lane_params)
-    while pool.count[K.STATE, 0] in (K.FRESH, K.RUNNING):
+    while pool.lanes.counters[K.STATE, 0] in (K.FRESH, K.RUNNING):
         pool.iterations = iterations
         pool.run()
-    assert pool.y[: model.n_rows, 0].tobytes() == ALONE["reduced"][6][3]
+    assert pool.lanes.y[: model.n_rows, 0].tobytes() == ALONE["reduced"][6][3]
 
 
 def test_sampling_does_not_change_the_run():

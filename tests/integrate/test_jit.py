@@ -246,7 +246,7 @@ def test_kernels_do_the_same_without_compilation():
     assert python(RUN, NUMBA_DISABLE_JIT="1") == run_here() + "\n"
 
 
-RUN_PACK = """
+RUN_VECTOR = """
 import numpy as np
 from chimera_hpc.integrate.lanes import Control, integrate
 from chimera_hpc.models.networked_fhn import NetworkedFHN
@@ -262,15 +262,15 @@ def run():
 """
 
 
-def test_packs_do_the_same_without_compilation():
+def test_vectors_do_the_same_without_compilation():
     here = {}
-    exec(RUN_PACK, here)
-    assert python(RUN_PACK + "print(run())", NUMBA_DISABLE_JIT="1") == here["run"]() + "\n"
+    exec(RUN_VECTOR, here)
+    assert python(RUN_VECTOR + "print(run())", NUMBA_DISABLE_JIT="1") == here["run"]() + "\n"
 
 
 def test_a_processor_without_fused_instructions_gives_the_same_bits(tmp_path):
     # Compiled for the oldest processor of this kind: the C library multiplies and adds there.
     here = {}
-    exec(RUN_PACK, here)
+    exec(RUN_VECTOR, here)
     old = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
-    assert python(RUN_PACK + "print(run())", **old) == here["run"]() + "\n"
+    assert python(RUN_VECTOR + "print(run())", **old) == here["run"]() + "\n"

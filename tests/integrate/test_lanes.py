@@ -11,13 +11,13 @@ from kernel_tools import System, powers, run_all
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate import lane_rows as K
-from chimera_hpc.integrate import stepper as kernel
+from chimera_hpc.integrate import stepper
 from chimera_hpc.integrate.lanes import (
-    PACK_BYTES,
     SAMPLE_BYTES,
     SLICE,
+    VECTOR_BYTES,
     Control,
-    Lanes,
+    LanePool,
     Stopped,
     choose_lanes,
     integrate,
@@ -104,7 +104,7 @@ def test_python_is_reached_every_half_second_of_work(lanes):
 def test_first_call_of_a_large_system_is_short_too():
     # 100,000 numbers in a lane; nothing is known about their speed before the first call.
     model = TopologicalFHN(Topology.ring(500, 200), form="full")
-    pool = Lanes(LANES, model, Control(1e3, 0.0, 1e3), 500)
+    pool = LanePool(LANES, model, Control(1e3, 0.0, 1e3), 500)
     for lane in range(LANES):
         pool.put(lane, np.full(model.n_rows, 0.1), model.lane_params)
     began = time.thread_time()
@@ -114,7 +114,7 @@ def test_first_call_of_a_large_system_is_short_too():
 
 def test_loop_allocates_nothing():
     model, y0 = stiff()
-    pool = Lanes(LANES, model, Control(0.01, 0.0, 1e-6), 50)
+    pool = LanePool(LANES, model, Control(0.01, 0.0, 1e-6), 50)
     for lane in range(LANES):
         pool.put(lane, y0, model.lane_params)
     pool.run()
@@ -124,44 +124,44 @@ def test_loop_allocates_nothing():
         pool.run()
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert pool.count[K.TRIED].min() >= 400
-    assert pool.count[K.NEXT_SAMPLE].min() > 1
-    assert peak < 20_000  # bytes; one state of the pack has 6,400, its samples 32 MB
+    assert pool.lanes.counters[K.TRIED].min() >= 400
+    assert pool.lanes.counters[K.NEXT_SAMPLE].min() > 1
+    assert peak < 20_000  # bytes; the state of all lanes has 6,400, its samples 32 MB
 
 
 def test_empty_lanes_stay_at_zero():
     model = TopologicalFHN(Topology.ring(9, 3).reorient_node(0, 3))
-    pool = Lanes(LANES, model, Control(1.0, 0.0, 0.1), 9)
+    pool = LanePool(LANES, model, Control(1.0, 0.0, 0.1), 9)
     pool.put(2, np.full(18, 0.1), model.lane_params)
-    while pool.count[K.STATE, 2] in (K.FRESH, K.RUNNING):
+    while pool.lanes.counters[K.STATE, 2] in (K.FRESH, K.RUNNING):
         pool.run()
     others = [lane for lane in range(LANES) if lane != 2]
-    assert pool.count[K.STATE, 2] == Status.DONE
-    assert not pool.y[:, others].any()
-    assert (pool.count[K.STATE, others] == K.IDLE).all()
+    assert pool.lanes.counters[K.STATE, 2] == Status.DONE
+    assert not pool.lanes.y[:, others].any()
+    assert (pool.lanes.counters[K.STATE, others] == K.IDLE).all()
 
 
 def test_cleared_lane_forgets_everything():
-    pool = Lanes(LANES, DECAY, CONTROL, 2)
+    pool = LanePool(LANES, DECAY, CONTROL, 2)
     pool.put(3, np.array([np.nan, 1.0]), DECAY.lane_params)
-    while pool.count[K.STATE, 3] in (K.FRESH, K.RUNNING):
+    while pool.lanes.counters[K.STATE, 3] in (K.FRESH, K.RUNNING):
         pool.run()
-    assert pool.count[K.STATE, 3] == Status.NON_FINITE
+    assert pool.lanes.counters[K.STATE, 3] == Status.NON_FINITE
     pool.clear(3)
-    for array in (pool.y, pool.y1, pool.k, pool.lane):
+    for array in (pool.lanes.y, pool.lanes.y1, pool.lanes.k, pool.lanes.lane):
         assert not array[:, 3].any()
 
 
 def test_no_other_number_of_lanes_is_compiled():
     with pytest.raises(ValueError, match="1 and 8 lanes, not 4"):
-        kernel.advance(4)
+        stepper.advance(4)
 
 
 def test_lanes_follow_the_work_and_the_memory():
     assert [choose_lanes(n, 100, 7, 50, 5001) for n in (1, 2, 3, 8)] == [1, 1, LANES, LANES]
-    most = SAMPLE_BYTES // (8 * LANES * 56)  # rows of samples are whole packs
+    most = SAMPLE_BYTES // (8 * LANES * 56)  # rows of samples are whole vectors
     assert [choose_lanes(8, 100, 7, 50, n) for n in (most, most + 1)] == [LANES, 1]
-    most = PACK_BYTES // (8 * LANES * 10)
+    most = VECTOR_BYTES // (8 * LANES * 10)
     assert [choose_lanes(8, n, 7, 50, 10) for n in (most, most + 1)] == [LANES, 1]
 
 
@@ -187,13 +187,13 @@ def test_sampling_times(t_end, start, step, times):
 @pytest.mark.parametrize("t_end", [1e-9, 1e-5, 0.1, 7.0, 1e4])
 def test_last_step_ends_at_the_end(t_end):
     control = Control(t_end, 0.0, t_end / 7)
-    pool = Lanes(1, DECAY, control, 2)
+    pool = LanePool(1, DECAY, control, 2)
     pool.put(0, np.ones(2), DECAY.lane_params)
-    while pool.count[K.STATE, 0] in (K.FRESH, K.RUNNING):
+    while pool.lanes.counters[K.STATE, 0] in (K.FRESH, K.RUNNING):
         pool.run()
-    assert pool.lane[K.TIME, 0] == t_end
-    assert pool.count[K.STATE, 0] == Status.DONE
-    assert pool.count[K.NEXT_SAMPLE, 0] == 8
+    assert pool.lanes.lane[K.TIME, 0] == t_end
+    assert pool.lanes.counters[K.STATE, 0] == Status.DONE
+    assert pool.lanes.counters[K.NEXT_SAMPLE, 0] == 8
 
 
 @pytest.mark.parametrize("lanes", [1, LANES])

@@ -1,4 +1,4 @@
-"""Memory of the stepping loop: whole cache lines, lent to one at a time."""
+"""Memory of the stepping loop: whole cache lines, used by one at a time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from kernel_tools import System, powers, run_all
 
 from chimera_hpc.integrate.lanes import Control, integrate
-from chimera_hpc.integrate.scratch import aligned, lent
+from chimera_hpc.integrate.scratch import aligned, scratch_buffer
 from chimera_hpc.integrate.simd import LANES
 
 DECAY = System(powers, np.array([-1.0, 1.0]), 2)
@@ -30,36 +30,36 @@ def test_state_begins_on_a_cache_line(rows, lanes):
 
 
 @given(st.lists(st.integers(1, 40), min_size=1, max_size=4))
-def test_room_is_the_same_memory_as_before_where_that_is_enough(sizes):
-    with lent(40 * 40) as largest:
+def test_buffer_is_the_same_memory_as_before_where_that_is_enough(sizes):
+    with scratch_buffer(40 * 40) as largest:
         address = largest.ctypes.data
     for size in sizes:
-        with lent(size, 40) as room:
-            assert room.shape == (size, 40)
-            assert room.flags.c_contiguous
-            assert room.ctypes.data == address
-    with lent(10**6) as larger:
+        with scratch_buffer(size, 40) as buffer:
+            assert buffer.shape == (size, 40)
+            assert buffer.flags.c_contiguous
+            assert buffer.ctypes.data == address
+    with scratch_buffer(10**6) as larger:
         assert larger.ctypes.data % 64 == 0
         larger[-1] = 1.0
 
 
-def test_room_that_is_lent_is_not_lent_again_within():
-    with lent(100) as mine, lent(100) as other:
+def test_buffer_in_use_is_not_given_out_again_within():
+    with scratch_buffer(100) as mine, scratch_buffer(100) as other:
         assert not np.shares_memory(mine, other)
 
 
-def test_each_thread_has_room_of_its_own():
-    """A thread that has given its room back keeps it: no other one may be working there."""
-    with lent(100) as mine:
+def test_each_thread_has_a_buffer_of_its_own():
+    """A thread that has given its buffer back keeps it: no other one may be working there."""
+    with scratch_buffer(100) as mine:
         pass
     both_have_one, found = Barrier(2, timeout=30), []
 
     def ask():
-        with lent(100) as room:
+        with scratch_buffer(100) as buffer:
             both_have_one.wait()
-            found.append(room)
-        with lent(100) as again:
-            assert again.ctypes.data == room.ctypes.data
+            found.append(buffer)
+        with scratch_buffer(100) as again:
+            assert again.ctypes.data == buffer.ctypes.data
             both_have_one.wait()
 
     with ThreadPoolExecutor(2) as pool:
@@ -69,14 +69,14 @@ def test_each_thread_has_room_of_its_own():
         assert not np.shares_memory(one, other)
 
 
-def test_room_comes_back_from_work_that_failed():
-    with pytest.raises(ValueError, match="its work failed"), lent(100) as room:
+def test_buffer_comes_back_from_work_that_failed():
+    with pytest.raises(ValueError, match="its work failed"), scratch_buffer(100) as buffer:
         raise ValueError("its work failed")
-    with lent(100) as again:
-        assert again.ctypes.data == room.ctypes.data
+    with scratch_buffer(100) as again:
+        assert again.ctypes.data == buffer.ctypes.data
 
 
-def test_samples_do_not_depend_on_who_used_the_room_before():
+def test_samples_do_not_depend_on_who_used_the_buffer_before():
     long, short = Control(1.0, 0.0, 0.001), Control(1.0, 0.0, 0.1)
     first = run_all([DECAY] * LANES, STARTS, short, lanes=LANES)
     run_all([DECAY] * LANES, STARTS[::-1], long, lanes=LANES)

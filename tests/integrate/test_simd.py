@@ -1,4 +1,4 @@
-"""Packs: every operation does in each lane what it does to a number, to the last bit."""
+"""SIMD vectors: every operation does in each lane what it does to a number, to the last bit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from chimera_hpc.integrate.simd import (
     LANES,
     across,
     add_shifted,
-    fetch,
+    broadcast,
     fma,
     fold,
     larger,
@@ -26,7 +26,7 @@ from chimera_hpc.integrate.simd import (
     load_at,
     load_some,
     magnitude,
-    splat,
+    prefetch,
     store,
     store_at,
     store_some,
@@ -45,7 +45,7 @@ def pairs():
 
 
 def apply_both(operation):
-    """The operation on all pairs, as packs and number by number."""
+    """The operation on all pairs, as vectors and number by number."""
 
     @numba.njit
     def work(like, a, b, out):
@@ -53,15 +53,15 @@ def apply_both(operation):
             store(out, row, operation(load(like, a, row), load(like, b, row)))
 
     @numba.njit
-    def packed(a, b, out):
-        work(splat(0.0), a, b, out)
+    def vectors(a, b, out):
+        work(broadcast(0.0), a, b, out)
 
     a, b = pairs()
-    pack, single = np.empty_like(a), np.empty_like(a)
-    packed(a, b, pack)
+    vector, single = np.empty_like(a), np.empty_like(a)
+    vectors(a, b, vector)
     columns = [x.reshape(-1, 1) for x in (a, b, single)]
     work(0.0, *columns)
-    return a, b, pack, single
+    return a, b, vector, single
 
 
 @pytest.mark.parametrize(
@@ -75,32 +75,32 @@ def apply_both(operation):
     ],
 )
 def test_binary_operation(operation, expected):
-    a, b, pack, single = apply_both(numba.njit(error_model="numpy")(lambda a, b: operation(a, b)))
+    a, b, vector, single = apply_both(numba.njit(error_model="numpy")(lambda a, b: operation(a, b)))
     with np.errstate(all="ignore"):
         truth = expected(a, b)
-    for got in (pack, single):
+    for got in (vector, single):
         np.testing.assert_array_equal(got, truth)
         signs = ~np.isnan(truth)
         np.testing.assert_array_equal(np.signbit(got[signs]), np.signbit(truth[signs]))
 
 
 def test_larger_takes_the_second_where_either_is_nan():
-    a, b, pack, _ = apply_both(numba.njit(lambda a, b: larger(a, b)))
+    a, b, vector, _ = apply_both(numba.njit(lambda a, b: larger(a, b)))
     either = np.isnan(a) | np.isnan(b)
-    np.testing.assert_array_equal(pack[either], b[either])
+    np.testing.assert_array_equal(vector[either], b[either])
 
 
-def test_magnitude_of_packs_and_numbers():
-    a, _, pack, single = apply_both(numba.njit(lambda a, b: magnitude(a)))
-    for got in (pack, single):
+def test_magnitude_of_vectors_and_numbers():
+    a, _, vector, single = apply_both(numba.njit(lambda a, b: magnitude(a)))
+    for got in (vector, single):
         np.testing.assert_array_equal(got, np.abs(a))
         assert not np.signbit(got[~np.isnan(a)]).any()
 
 
 @compiled
 def mixed(y, dy, lane_params, int_params):
-    # A pack and a number, on either side.
-    like = splat(0.0)
+    # A vector and a number, on either side.
+    like = broadcast(0.0)
     x = load(like, y, 0)
     store(dy, 0, 2.0 + x)
     store(dy, 1, x + 2.0)
@@ -112,7 +112,7 @@ def mixed(y, dy, lane_params, int_params):
     store(dy, 7, x / 2.0)
 
 
-def test_a_number_meets_every_lane_of_a_pack():
+def test_a_number_meets_every_lane_of_a_vector():
     x = np.linspace(-3.0, 5.0, LANES)
     out = np.empty((8, LANES))
     mixed(x[None, :].copy(), out, np.zeros((1, LANES)), np.zeros(1, dtype=np.int64))
@@ -122,8 +122,8 @@ def test_a_number_meets_every_lane_of_a_pack():
 
 @compiled
 def fused(y, dy, lane_params, int_params):
-    # Packs and numbers in every place.
-    like, number = splat(0.0), lane_params[0, 0]
+    # Vectors and numbers in every place.
+    like, number = broadcast(0.0), lane_params[0, 0]
     a, b, c = load(like, y, 0), load(like, y, 1), load(like, y, 2)
     store(dy, 0, fma(a, b, c))
     store(dy, 1, fma(number, b, c))
@@ -170,12 +170,12 @@ def test_fma_of_what_is_not_finite():
 def test_rows_are_read_and_written_where_they_are():
     @numba.njit
     def swap(a):
-        like = splat(0.0)
+        like = broadcast(0.0)
         first, last = load(like, a, 0), load(like, a, a.shape[0] - 1)
         store(a, 0, last)
         store(a, a.shape[0] - 1, first)
 
-    # Rows of a pack need not begin on its size in memory.
+    # Rows of vectors need not begin on its size in memory.
     raw = np.arange(5.0 * LANES + 1.0)[1:]
     a = raw.reshape(5, LANES)
     expected = a[[4, 1, 2, 3, 0]].copy()
@@ -196,7 +196,7 @@ def neighbours(work, array, offset, low, high, out):
 
 
 @pytest.mark.parametrize(("low", "high"), [(0, 0), (0, 8), (0, 3), (5, 8), (2, 6)])
-def test_packs_of_neighbouring_rows(low, high):
+def test_vectors_of_neighbouring_rows(low, high):
     array = np.random.default_rng(0).normal(size=(40, 1))
     out = np.full((48, 1), 7.0)
     neighbours(0.0, array, 11, low, high, out)
@@ -212,13 +212,13 @@ def test_packs_of_neighbouring_rows(low, high):
     assert out[41, 0] == rows[7]
 
 
-def test_eight_packs_turn_round():
+def test_eight_vectors_are_transposed():
     @numba.njit
     def turn(a, out):
-        like = splat(0.0)
+        like = broadcast(0.0)
         p0, p1, p2, p3 = load(like, a, 0), load(like, a, 1), load(like, a, 2), load(like, a, 3)
         p4, p5, p6, p7 = load(like, a, 4), load(like, a, 5), load(like, a, 6), load(like, a, 7)
-        q0, q1, q2, q3, q4, q5, q6, q7 = transposed(p0, p1, p2, p3, p4, p5, p6, p7)
+        q0, q1, q2, q3, q4, q5, q6, q7 = transposed((p0, p1, p2, p3, p4, p5, p6, p7))
         stream_at(out, 0, q0)
         stream_at(out, 8, q1)
         stream_at(out, 16, q2)
@@ -234,11 +234,11 @@ def test_eight_packs_turn_round():
 
 
 @pytest.mark.parametrize("row", [-(10**6), -1, 0, 8, 10**6])
-def test_fetching_reads_and_writes_nothing(row):
+def test_prefetching_reads_and_writes_nothing(row):
     @numba.njit
     def ask(array, row):
-        fetch(splat(0.0), array, row)
-        fetch(0.0, array, row)
+        prefetch(broadcast(0.0), array, row)
+        prefetch(0.0, array, row)
 
     array = np.arange(64.0).reshape(8, 8)
     ask(array, row)

@@ -123,7 +123,7 @@ def test_networked_points():
     assert np.isfinite(result.features[:, :4]).all()
 
 
-@pytest.mark.parametrize("method", ["tsit5", "dopri5", "verner6", "kcl4"])
+@pytest.mark.parametrize("method", ["tsit5", "dopri5"])
 def test_every_method_runs_a_block_and_they_agree(method):
     s = sweep(f"method={method} rtol=1e-8 atol=1e-10 t_end=10.0 features.start=2.0", seeds(1))
     truth = sweep("rtol=1e-9 atol=1e-12 t_end=10.0 features.start=2.0", seeds(1))

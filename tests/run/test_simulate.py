@@ -76,10 +76,8 @@ def test_defaults_are_those_of_the_paper():
 
 def test_methods_agree():
     options = {"t_end": 2.0, "t_step": 0.1, "rtol": 1e-9, "atol": 1e-12}
-    runs = [
-        simulate(RING, **START, **options, method=m) for m in ("tsit5", "dopri5", "verner6", "kcl4")
-    ]
-    assert len({run.steps for run in runs}) == 4
+    runs = [simulate(RING, **START, **options, method=m) for m in ("tsit5", "dopri5")]
+    assert len({run.steps for run in runs}) == 2
     for run in runs[1:]:
         np.testing.assert_allclose(run.u, runs[0].u, atol=1e-7)
 
@@ -123,7 +121,7 @@ def test_time_out():
         ({"b": math.inf}, "epsilon = 0.05, b = inf"),
         ({"c": math.nan}, "epsilon = 0.05, b = 0.5, c = nan"),
         ({"form": "ful"}, "form = 'ful': allowed are reduced, full"),
-        ({"method": "rk4"}, "method = 'rk4': allowed are tsit5, dopri5, verner6, kcl4"),
+        ({"method": "rk4"}, "method = 'rk4': allowed are tsit5, dopri5"),
         ({"t_end": 0.0}, "t_start = 0.0, t_end = 0.0"),
         ({"t_end": math.inf}, "t_start = 0.0, t_end = inf"),
         ({"t_end": math.nan}, "t_start = 0.0, t_end = nan"),

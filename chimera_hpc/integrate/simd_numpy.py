@@ -1,0 +1,105 @@
+"""The functions of `simd` without compilation: a vector is a NumPy array of `LANES` numbers."""
+
+import ctypes
+
+import numpy as np
+
+from chimera_hpc.integrate.simd_constants import LANES, SCAN
+
+
+def broadcast(value):
+    """Return a vector with ``value`` in every lane."""
+    return np.full(LANES, value)
+
+
+def load(like, array, row):
+    """Read row ``row`` of ``array`` (rows, lanes) as the kind of number ``like`` is."""
+    return array[row, 0] if np.ndim(like) == 0 else load_at(array, row * LANES)
+
+
+def store(array, row, value):
+    """Write a number or a vector into row ``row`` of ``array`` (rows, lanes)."""
+    if np.ndim(value):
+        store_at(array, row * LANES, value)
+    else:
+        array[row, 0] = value
+
+
+def across(like, array, row):
+    """Read the lanes' numbers as a vector; the number of a single lane fills all places."""
+    return np.full(LANES, array[row, 0]) if np.ndim(like) == 0 else array[row].copy()
+
+
+def load_at(array, offset):
+    """Read `LANES` neighbours from the numbers of ``array`` in the order of memory."""
+    return array.reshape(-1)[offset : offset + LANES].copy()
+
+
+def store_at(array, offset, vector):
+    """Write a vector over neighbours among the numbers of ``array`` in the order of memory."""
+    array.reshape(-1)[offset : offset + LANES] = vector
+
+
+def load_some(array, offset, low, high):
+    """Read places ``low <= j < high`` of a vector as `load_at` does; -0.0 elsewhere."""
+    vector = np.full(LANES, -0.0)
+    vector[low:high] = array.reshape(-1)[offset + low : offset + high]
+    return vector
+
+
+def store_some(array, offset, vector, count):
+    """Write the first ``count`` places of a vector as `store_at` does."""
+    array.reshape(-1)[offset : offset + count] = vector[:count]
+
+
+def add_shifted(vector, level):
+    """Do one level of `SCAN` within a vector."""
+    source = np.array(SCAN[level])
+    return vector + np.where(source < LANES, vector[source % LANES], -0.0)
+
+
+def last_of(vector):
+    """Return the number in the last place of a vector."""
+    return vector[LANES - 1]
+
+
+def fold(vector):
+    """Sum a vector: add its halves until one number is left."""
+    half = vector[:4] + vector[4:]
+    quarter = half[:2] + half[2:]
+    return quarter[0] + quarter[1]
+
+
+def stream_at(array, offset, vector):
+    """Write as `store_at` does, past the caches; the place must begin a cache line."""
+    store_at(array, offset, vector)
+
+
+def prefetch(like, array, row):
+    """Bring row ``row``, which need not exist, into the first cache."""
+
+
+def transposed(vectors):
+    """Transpose eight vectors: vector m of the result holds place m of each."""
+    return tuple(np.stack(vectors).T.copy())
+
+
+_fused = ctypes.CDLL(None).fma  # of the C library
+_fused.restype, _fused.argtypes = ctypes.c_double, 3 * [ctypes.c_double]
+
+
+def fma(a, b, c):
+    """Return ``a * b + c``, lane by lane, rounded once: IEEE 754's fusedMultiplyAdd."""
+    columns = np.broadcast_arrays(a, b, c)
+    each = [_fused(*numbers) for numbers in np.stack(columns).reshape(3, -1).T]
+    return np.array(each) if len(each) > 1 else np.float64(each[0])
+
+
+def larger(a, b):
+    """Return the larger of two numbers, lane by lane; ``b`` where either is NaN."""
+    return np.where(a > b, a, b) if np.ndim(a) else (a if a > b else b)
+
+
+def magnitude(a):
+    """Return the absolute value, lane by lane."""
+    return np.abs(a)
