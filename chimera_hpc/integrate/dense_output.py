@@ -136,25 +136,25 @@ def _weigh(like, lanes, row, p, first):
 
 
 @jit()
-def _keep(lanes, is_due, at, m, i, vector):
-    # Rows i ... i + 7 of lane m's sample, where one is due.
-    if lanes.counters[is_due, m] == 1:
-        total, width = lanes.samples.shape[1:]
-        place = (m * total + lanes.counters[NEXT_SAMPLE, m] + at) * width + i
-        stream_at(lanes.samples, place, vector)
+def _keep(samples, count, is_due, at, m, i, vector):
+    # Rows i ... i + 7 of lane m's sample, where one is due. Called for each lane and each vector of
+    # rows, and not inlined: it takes the two arrays that it uses, not all of `Lanes`.
+    if count[is_due, m] == 1:
+        total, width = samples.shape[1:]
+        stream_at(samples, (m * total + count[NEXT_SAMPLE, m] + at) * width + i, vector)
 
 
 @jit()
-def _keep_tile(lanes, is_due, at, i, tile):
+def _keep_tile(samples, count, is_due, at, i, tile):
     s0, s1, s2, s3, s4, s5, s6, s7 = transposed(tile)
-    _keep(lanes, is_due, at, 0, i, s0)
-    _keep(lanes, is_due, at, 1, i, s1)
-    _keep(lanes, is_due, at, 2, i, s2)
-    _keep(lanes, is_due, at, 3, i, s3)
-    _keep(lanes, is_due, at, 4, i, s4)
-    _keep(lanes, is_due, at, 5, i, s5)
-    _keep(lanes, is_due, at, 6, i, s6)
-    _keep(lanes, is_due, at, 7, i, s7)
+    _keep(samples, count, is_due, at, 0, i, s0)
+    _keep(samples, count, is_due, at, 1, i, s1)
+    _keep(samples, count, is_due, at, 2, i, s2)
+    _keep(samples, count, is_due, at, 3, i, s3)
+    _keep(samples, count, is_due, at, 4, i, s4)
+    _keep(samples, count, is_due, at, 5, i, s5)
+    _keep(samples, count, is_due, at, 6, i, s6)
+    _keep(samples, count, is_due, at, 7, i, s7)
 
 
 @jit()
@@ -163,22 +163,22 @@ def sample(like, h, step, lanes, p, limits):
 
     The lanes take their first two, second two, ... samples of the step together.
     """
-    count, weights = lanes.counters, lanes.weights
-    width = lanes.samples.shape[2]
+    count, weights, samples = lanes.counters, lanes.weights, lanes.samples
+    width = samples.shape[2]
     while _due(lanes, limits, 0, IS_DUE, THETA) > 0:
         _weigh(like, lanes, THETA, p, 0)
         if count.shape[1] == 1:
             base = count[NEXT_SAMPLE, 0] * width
             for i in range(width // LANES):
-                stream_at(lanes.samples, base + i * LANES, _between(h, step, weights, i))
+                stream_at(samples, base + i * LANES, _between(h, step, weights, i))
         elif _due(lanes, limits, 1, IS_DUE_AFTER, THETA_AFTER) > 0:
             _weigh(like, lanes, THETA_AFTER, p, p.shape[0])
             for i in range(0, width, LANES):
                 tile, after = _two_tiles(h, step, weights, i)
-                _keep_tile(lanes, IS_DUE, 0, i, tile)
-                _keep_tile(lanes, IS_DUE_AFTER, 1, i, after)
+                _keep_tile(samples, count, IS_DUE, 0, i, tile)
+                _keep_tile(samples, count, IS_DUE_AFTER, 1, i, after)
         else:
             for i in range(0, width, LANES):
-                _keep_tile(lanes, IS_DUE, 0, i, _tile(h, step, weights, i))
+                _keep_tile(samples, count, IS_DUE, 0, i, _tile(h, step, weights, i))
         for m in range(count.shape[1]):
             count[NEXT_SAMPLE, m] += count[IS_DUE, m] + count[IS_DUE_AFTER, m]

@@ -19,6 +19,9 @@ QUICKSTART = (Path(__file__).parents[2] / "jobs" / "quickstart.toml").read_text(
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
+        # methods of version 0.1
+        (["integrator.method=verner6"], 'method "verner6" was removed in version 0.2: use "tsit5"'),
+        (["integrator.method=kcl4"], 'method "kcl4" was removed in version 0.2: use "tsit5"'),
         # unknown keys
         (["integrator.rtoll=1"], "integrator.rtoll: unknown key; did you mean rtol?"),
         (["integrator.n_peaks=1"], "integrator.n_peaks: unknown key; it belongs in [features]"),

@@ -12,6 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from chimera_hpc import fourier_features, simulate, total_variations
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.lanes import Control
 from chimera_hpc.integrate.lanes import integrate as real_integrate
@@ -31,6 +32,7 @@ from chimera_hpc.store.schema import (
     sample_times,
     scalar_labels,
 )
+from chimera_hpc.store.store import Store
 
 
 def sweep(text="", grid='P = [9, 12]\nQ = "P"\nseeds = 3', model="topological_fhn"):
@@ -468,3 +470,14 @@ def test_after_warm_up_a_block_compiles_nothing(monkeypatch):
     )
     run_block(s, s.points())
     assert compiled == []
+
+
+def test_store_of_a_removed_method_is_read_and_not_computed(tmp_path):
+    data = sweep().to_dict()
+    data["integrator"]["method"] = "verner6"
+    old = Sweep.from_dict(data)
+    Store.plan(tmp_path / "store.zarr", old)
+    assert Store.open(tmp_path / "store.zarr").sweep == old
+    for compute in (run_block, warm_up):
+        with pytest.raises(BadInput, match=r'"verner6" was removed in version 0\.2: use "tsit5"'):
+            compute(old, old.points()[:1])

@@ -122,6 +122,7 @@ def test_time_out():
         ({"c": math.nan}, "epsilon = 0.05, b = 0.5, c = nan"),
         ({"form": "ful"}, "form = 'ful': allowed are reduced, full"),
         ({"method": "rk4"}, "method = 'rk4': allowed are tsit5, dopri5"),
+        ({"method": "verner6"}, 'method "verner6" was removed in version 0.2: use "tsit5"'),
         ({"t_end": 0.0}, "t_start = 0.0, t_end = 0.0"),
         ({"t_end": math.inf}, "t_start = 0.0, t_end = inf"),
         ({"t_end": math.nan}, "t_start = 0.0, t_end = nan"),
