@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from chimera_hpc.measures import fourier_features
+    from chimera_hpc.measures.fourier import fourier_features
     from chimera_hpc.measures.variation import total_variations
     from chimera_hpc.models.custom import OwnModel
     from chimera_hpc.models.networked_fhn import NetworkedFHN
@@ -39,7 +39,7 @@ _EXPORTS = {
     "OwnModel": ("chimera_hpc.models.custom", "OwnModel"),
     "Parameter": ("chimera_hpc.models.parameters", "Parameter"),
     "Topology": ("chimera_hpc.network.topology", "Topology"),
-    "fourier_features": ("chimera_hpc.measures", "fourier_features"),
+    "fourier_features": ("chimera_hpc.measures.fourier", "fourier_features"),
     "open": ("chimera_hpc.store.labelled", "open_sweep"),
     "simulate": ("chimera_hpc.run.simulate", "simulate"),
     "total_variations": ("chimera_hpc.measures.variation", "total_variations"),

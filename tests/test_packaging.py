@@ -136,6 +136,15 @@ def test_every_folder_says_in_one_sentence_what_it_is():
         assert ". " not in first, name
 
 
+def test_no_public_class_name_is_defined_in_two_modules():
+    homes: dict[str, list[str]] = {}
+    for source in SOURCES:
+        for node in ast.parse(source.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(module_name(source))
+    assert {name: places for name, places in homes.items() if len(places) > 1} == {}
+
+
 def test_design_lists_the_layers():
     text = (ROOT / "DESIGN.md").read_text("utf-8")
     assert tuple(re.findall(r"^\| `(\w+)/` \|", text, flags=re.MULTILINE)) == LAYERS

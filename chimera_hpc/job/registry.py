@@ -1,6 +1,6 @@
 """The one registry: what a job may name, and where it is.
 
-For developers: a model, a method, an analysis or a figure is one file and one line here,
+For developers: a model, a method, a measure, an analysis or a figure is one file and one line here,
 ``name: "module:object"``. Nothing is imported before it is asked for.
 """
 
@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.errors import BadInput
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from chimera_hpc.integrate.tableau import Tableau
+    from chimera_hpc.measures.measure import Measure
 
 MODELS = {
     "topological_fhn": "chimera_hpc.models.topological_fhn:MODEL",
@@ -29,6 +32,28 @@ METHODS = {
 
 REMOVED_METHODS = {"verner6": "tsit5", "kcl4": "tsit5"}
 """Pairs of version 0.1, which a store may name, and what to use instead."""
+
+MEASURES = {
+    "variations": "chimera_hpc.measures.scalars:VARIATIONS",
+    "sigma": "chimera_hpc.measures.scalars:SIGMA",
+    "deviation": "chimera_hpc.measures.scalars:DEVIATION",
+    "range": "chimera_hpc.measures.scalars:RANGE",
+    "order_parameter": "chimera_hpc.measures.scalars:ORDER_PARAMETER",
+    "distance": "chimera_hpc.measures.scalars:DISTANCE",
+    "local_sigma": "chimera_hpc.measures.scalars:LOCAL_SIGMA",
+}
+"""Numbers of a run: `measures.measure.Measure`."""
+
+DEFAULT_PANEL = (
+    "variations",
+    "sigma",
+    "deviation",
+    "range",
+    "order_parameter",
+    "distance",
+    "local_sigma",
+)
+"""Measures of a job that names none; another default would be another digest."""
 
 ANALYSES = {
     "networks": "chimera_hpc.reduction.analyses.ring:networks",
@@ -97,3 +122,8 @@ def method(name: str) -> Tableau:
         raise BadInput(f'method "{name}" was removed in version 0.2: use "{instead}"')
     found: Tableau = load(METHODS[name])
     return found
+
+
+def measures(names: Iterable[str]) -> list[Measure]:
+    """Return the measures of these names."""
+    return [load(MEASURES[name]) for name in names]

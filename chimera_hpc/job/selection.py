@@ -10,7 +10,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.models import built_in
 from chimera_hpc.job.parameters import DELTA, SEED
-from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES
+from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES, MEASURES
 from chimera_hpc.models.parameters import ModelParameters, Parameter
 
 _EXAMPLE = 'NAME=NUMBER is needed, such as "P=9 Q=9 seed=0"'
@@ -103,6 +103,20 @@ def check_analyses(value: Any) -> tuple[str, ...]:
         raise BadInput(f"reduction.analyses: {short(value)} is not a list of names")
     for name in names:
         check_name("reduction.analyses", "an analysis", name, ANALYSES)
+    return names
+
+
+def check_measures(value: Any) -> tuple[str, ...]:
+    """Return a tuple of different known names of measures; BadInput for others."""
+    names = _texts(value)
+    if names is None:
+        raise BadInput(f"measures.panel: {short(value)} is not a list of names")
+    for name in names:
+        check_name("measures.panel", "a measure", name, MEASURES)
+    if len(set(names)) < len(names):
+        raise BadInput(f"measures.panel: {short(list(names))} holds a name twice")
+    if names[:1] != ("variations",):
+        raise BadInput("measures.panel: variations must come first; the classes are made of them")
     return names
 
 

@@ -40,7 +40,17 @@ from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
 from chimera_hpc.job.points import DTYPES, Points, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
 from chimera_hpc.job.selection import check_names
-from chimera_hpc.job.tables import Features, Integrator, Keep, Line, Reduction, Run, Slurm, Table
+from chimera_hpc.job.tables import (
+    Features,
+    Integrator,
+    Keep,
+    Line,
+    Measures,
+    Reduction,
+    Run,
+    Slurm,
+    Table,
+)
 
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
 _OLD_NAMES = {new: old for old, new in renaming.FEATURES.items()}
@@ -75,6 +85,7 @@ class Sweep(Table):
     )
     integrator: Integrator = Field(default_factory=Integrator)
     features: Features = Field(default_factory=Features)
+    measures: Measures = Field(default_factory=Measures)
     reduction: Reduction = Field(default_factory=Reduction)
     keep: Keep = Field(default_factory=Keep)
     run: Run = Field(default_factory=Run)
@@ -156,13 +167,14 @@ class Sweep(Table):
         """16 hexadecimal digits: 64-bit BLAKE2b of what decides the points and their numbers.
 
         It covers model, grid (with the order of the axes), fixed, integrator and features as
-        canonical JSON.
+        canonical JSON, and measures unless they are the default.
         """
         return spec_digest(self.to_dict())
 
     def explain_difference(self, other: Sweep) -> list[str]:
         """Return a line for each digested key that `other`, the one in the store, has otherwise."""
-        here, there = (_flat(_digested(sweep.to_dict())) for sweep in (self, other))
+        specs = (self.to_dict(), other.to_dict())
+        here, there = (_flat({**_digested(spec), "measures": spec["measures"]}) for spec in specs)
         return [
             f"{key}: {_shown(here.get(key))} here, {_shown(there.get(key))} in the store"
             for key in {**here, **there}
@@ -236,6 +248,10 @@ def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
     if "delta" in spec["grid"]:
         integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
         data["integrator"] = integrator
+    # Digests made before there was this table stay as they are.
+    default = Measures().model_dump(mode="json")
+    if spec.get("measures", default) != default:
+        data["measures"] = spec["measures"]
     return {**data, "order of axes": list(spec["grid"])}
 
 

@@ -16,8 +16,13 @@ from pydantic import (
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.job.registry import METHODS, REMOVED_METHODS
-from chimera_hpc.job.selection import check_analyses, check_figures, check_selections
+from chimera_hpc.job.registry import DEFAULT_PANEL, MEASURES, METHODS, REMOVED_METHODS
+from chimera_hpc.job.selection import (
+    check_analyses,
+    check_figures,
+    check_measures,
+    check_selections,
+)
 
 
 def _as_tuple(value: Any) -> Any:
@@ -158,6 +163,16 @@ class Features(Table):
         return self
 
 
+class Measures(Table):
+    """Which numbers each run is measured by."""
+
+    panel: Annotated[tuple[str, ...], BeforeValidator(check_measures)] = Field(
+        DEFAULT_PANEL,
+        description="Measures, in the order of the store's scalars; variations come first.",
+        json_schema_extra={"items": {"enum": list(MEASURES), "type": "string"}},
+    )
+
+
 class Reduction(Table):
     """How the points become classes; not part of the digest."""
 
@@ -268,6 +283,7 @@ class Slurm(Table):
 TABLES: dict[str, type[Table]] = {
     "integrator": Integrator,
     "features": Features,
+    "measures": Measures,
     "reduction": Reduction,
     "keep": Keep,
     "run": Run,

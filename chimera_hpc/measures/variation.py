@@ -1,4 +1,4 @@
-"""Total normalised variations: how ragged phase, amplitude and frequency are along the ring."""
+"""Total normalised variations of phase, amplitude and frequency along the ring."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from chimera_hpc.base.errors import BadInput
 Array = NDArray[np.float64]
 
 
-class Profiles(Protocol):
+class HasProfiles(Protocol):
     """Anything that holds mean phase (rad), amplitude and frequency of each node, each (N,)."""
 
     @property
@@ -23,7 +23,7 @@ class Profiles(Protocol):
     def frequency(self) -> Array: ...
 
 
-def total_variations(features: Profiles) -> tuple[float, float, float]:
+def total_variations(features: HasProfiles) -> tuple[float, float, float]:
     """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, section ssec:TNVar).
 
     As `total_variation_arrays`, for an object with the attributes phase, amplitude and frequency.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.classify.classification import Classification
-from chimera_hpc.measures import FEATURES as LABELS
+from chimera_hpc.measures.fourier import FEATURES as LABELS
 
 Array = NDArray[np.float64]
 

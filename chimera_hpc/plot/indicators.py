@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from chimera_hpc.measures import FEATURES
+from chimera_hpc.measures.fourier import FEATURES
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
 

@@ -14,7 +14,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.job.tables import Features
-from chimera_hpc.measures import FourierFeatures, fourier_features
+from chimera_hpc.measures.fourier import FourierFeatures, fourier_features
 from chimera_hpc.measures.variation import total_variation_arrays
 from chimera_hpc.measures.windows import maxima
 from chimera_hpc.recordings.gaps import called

@@ -39,6 +39,12 @@ class AnalysisInput:
     series: Callable[[int], tuple[Array, Array]] | None = None
     """Time (T,) and u (T, N) of a point by its index."""
 
+    def scalar(self, name: str) -> Array:
+        """Return one of the scalars (n,); raise BadInput when the job's measures have it not."""
+        if name not in self.scalars:
+            raise BadInput(f"measures.panel has no measure that gives {name}")
+        return self.scalars[name]
+
     @cached_property
     def triplets(self) -> Array:
         """V_theta, V_a, V_Omega, shape (n, 3)."""
@@ -75,7 +81,7 @@ class AnalysisInput:
     def local_sigma(self) -> Array:
         """Return the local deviations sigma(m), shape (n, groups)."""
         groups = self.sweep.features.groups
-        return np.stack([self.scalars[f"local_sigma_{m + 1}"] for m in range(groups)], axis=1)
+        return np.stack([self.scalar(f"local_sigma_{m + 1}") for m in range(groups)], axis=1)
 
     def need_runs(self) -> None:
         """Raise BadInput unless two points have a result."""

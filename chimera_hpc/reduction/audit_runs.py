@@ -133,7 +133,7 @@ def compute_piece(path: Path, chosen: Integers, way: str) -> Runs:
 
 def runs_of(status: Integers, scalars: NDArray[np.float64], steps: Integers, sweep: Sweep) -> Runs:
     """Pick out what labels need; `scalars` (n, n_scalars) as in a store."""
-    place = {label: k for k, label in enumerate(scalar_labels(sweep.features.groups))}
+    place = {label: k for k, label in enumerate(scalar_labels(sweep))}
     triplets = scalars[:, [place[name] for name in TRIPLET]]
     return Runs(status, triplets, scalars[:, place["distance"]], steps)
 

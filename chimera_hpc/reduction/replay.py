@@ -13,7 +13,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.modes import run_names
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Features
-from chimera_hpc.measures import window_lines
+from chimera_hpc.measures.fourier import window_lines
 from chimera_hpc.plot.spectrum import Spectrum
 from chimera_hpc.reduction.cells import describe, free_axes
 from chimera_hpc.reduction.results import TRIPLET

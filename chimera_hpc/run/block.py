@@ -18,17 +18,10 @@ from chimera_hpc.integrate.lanes import Control, Outcome, Stopped, integrate
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.models import build
-from chimera_hpc.job.registry import method
-from chimera_hpc.measures import (
-    FourierFeatures,
-    fourier_features,
-    local_sigma,
-    order_parameter,
-    range_of,
-    sigma,
-)
+from chimera_hpc.job.registry import measures, method
+from chimera_hpc.measures.fourier import FourierFeatures, fourier_features
+from chimera_hpc.measures.measure import Measure, MeasuredRun
 from chimera_hpc.measures.series import by_node, quantise, round_to
-from chimera_hpc.measures.variation import total_variations
 from chimera_hpc.models.protocol import Model
 from chimera_hpc.run.initial_state import initial_state
 from chimera_hpc.store.block_result import BlockResult, empty_result
@@ -125,6 +118,7 @@ class _Block:
             for row, model in zip(rows, self.models, strict=True)
         ]
         self.options = sweep.features.options()
+        self.panel = measures(sweep.measures.panel)
         self.keeps = series_mask(sweep, points.columns["seed"])
         self.result = empty_result(sweep, n)
         # Of the run being measured: u as stored, u and w node by node.
@@ -202,15 +196,9 @@ class _Block:
     def scalars(
         self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
     ) -> Array:
-        return np.array(
-            [
-                *total_variations(features),
-                *(sigma(u), sigma(w)),
-                *(features.deviation, range_of(u)),
-                *(order_parameter(u, w), self.distance(row, y_end)),
-                *local_sigma(u, self.sweep.features.groups),
-            ]
-        )
+        distance = self.distance(row, y_end)
+        run = MeasuredRun(self.times, u, w, features, self.sweep.features, distance)
+        return _measure(self.panel, run)
 
     def distance(self, row: int, y_end: Array) -> float:
         """Distance of the last state (u, v) from the centre of the ball of initial states.
@@ -225,6 +213,10 @@ class _Block:
         if spec.ball == "maximum":
             return float(np.abs(offset).max())
         return float(np.sqrt(np.sum(offset * offset)))
+
+
+def _measure(panel: list[Measure], run: MeasuredRun) -> Array:
+    return np.array([number for measure in panel for number in measure.compute(run)])
 
 
 def warm_up(sweep: Sweep, points: Points) -> None:
@@ -248,9 +240,12 @@ def _warm_up_the_rest(sweep: Sweep, model: Model) -> None:
     t = 0.01 * np.arange(2000.0)
     rows = np.sin(2.0 * np.pi * t + np.arange(3.0)[:, None])
     spec = sweep.features
-    fourier_features(t, rows.T, window_reference=spec.window_reference, refine=spec.refine)
-    order_parameter(rows.T, rows.T)
-    local_sigma(rows.T, 1)
+    features = fourier_features(
+        t, rows.T, window_reference=spec.window_reference, refine=spec.refine
+    )
+    one_group = spec.model_copy(update={"groups": 1})
+    run = MeasuredRun(t, rows.T, rows.T, features, one_group, 0.0)
+    _measure(measures(sweep.measures.panel), run)
     # In the integrator's order: time by time.
     samples = np.repeat(rows, 2, axis=0).T.copy().T
     back = np.empty(rows.shape)

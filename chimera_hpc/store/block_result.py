@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.measures import FEATURES
-from chimera_hpc.store.schema import MISSING, scalar_labels
+from chimera_hpc.store.schema import FEATURES, MISSING, scalar_labels
 
 Array = NDArray[np.float64]
 
@@ -27,9 +26,9 @@ class BlockResult:
     status : shape (n,)
         `Status` of each point.
     features : shape (n, 8, N0)
-        Along axis 1 `features.FEATURES`; NaN unless the point is DONE.
+        Along axis 1 `schema.FEATURES`; NaN unless the point is DONE.
     scalars : shape (n, n_scalars)
-        Along axis 1 `layout.scalar_labels`; like the features, of u as it is stored (`rounded`).
+        Along axis 1 `schema.scalar_labels`; like the features, of u as it is stored (`rounded`).
     steps, elapsed_us, n_windows : shape (n,)
         Accepted steps, share of the wall time in microseconds, Fourier windows.
     series : shape (n, T, N0) or None
@@ -62,7 +61,7 @@ def empty_result(sweep: Sweep, n: int) -> BlockResult:
     return BlockResult(
         status=np.full(n, int(Status.NEVER), dtype=np.int64),
         features=np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
-        scalars=np.full((n, len(scalar_labels(sweep.features.groups))), np.nan),
+        scalars=np.full((n, len(scalar_labels(sweep))), np.nan),
         steps=np.zeros(n, dtype=np.int64),
         elapsed_us=np.zeros(n, dtype=np.int64),
         n_windows=np.zeros(n, dtype=np.int64),

@@ -46,7 +46,7 @@ def gather(model: str = "") -> dict[str, Any]:
     """
     return {
         "package": {"name": PACKAGE.name, "version": __version__},
-        "source": source_digest(),
+        "source": package_digest(),
         "git": git_state(PACKAGE.parent),
         "python": platform.python_version(),
         "libraries": {name: _version_of(name) for name in _LIBRARIES},
@@ -77,7 +77,7 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
 
 
 @cache
-def source_digest() -> str:
+def package_digest() -> str:
     """Return 16 hexadecimal digits over the names and contents of all modules of the package."""
     total = blake2b(digest_size=8)
     for path in sorted(PACKAGE.rglob("*.py")):

@@ -25,7 +25,7 @@ Variable = tuple[tuple[str, ...], ArrayLike] | tuple[tuple[str, ...], ArrayLike,
 
 
 @dataclass(frozen=True)
-class Reduction:
+class StoredReduction:
     """What a reduction stored."""
 
     arrays: dict[str, NDArray[Any]]
@@ -53,14 +53,14 @@ def write_reduction(
     shutil.rmtree(old, ignore_errors=True)
 
 
-def read_reduction(path: Path) -> Reduction:
+def read_reduction(path: Path) -> StoredReduction:
     """Return the stored reduction; raise BadInput when there is none yet."""
     try:
         group = zarr.open_group(path / NAME, mode="r", use_consolidated=False)
     except FileNotFoundError:
         raise BadInput(f"{path}: not reduced yet; `reduce` does it") from None
     arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
-    return Reduction(arrays, dict(group.attrs))
+    return StoredReduction(arrays, dict(group.attrs))
 
 
 def _create(group: zarr.Group, name: str, variable: Variable) -> None:

@@ -20,6 +20,7 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.job.axes import Values
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.parameters import DELTA, SEED
+from chimera_hpc.job.registry import measures
 from chimera_hpc.store.ledger import FIELDS
 
 BLOCK_ARRAYS = ("u", "features", "scalars", "ledger")
@@ -82,11 +83,10 @@ class Room:
     """Upper limit: as if nothing could be compressed."""
 
 
-def scalar_labels(groups: int) -> tuple[str, ...]:
-    """Return the names along `quantity` for a sweep with this number of groups of nodes."""
-    names = ("V_theta", "V_a", "V_Omega", "sigma_1", "sigma_2")
-    others = ("std_u", "range_u", "order_parameter", "distance")
-    return (*names, *others, *(f"local_sigma_{m}" for m in range(1, groups + 1)))
+def scalar_labels(sweep: Sweep) -> tuple[str, ...]:
+    """Return the names along `quantity`: the labels of the sweep's measures, in order."""
+    panel = measures(sweep.measures.panel)
+    return tuple(label for measure in panel for label in measure.labels(sweep.features))
 
 
 def sample_times(sweep: Sweep) -> NDArray[np.float64]:
@@ -159,7 +159,7 @@ def block_plans(
         shape, chunks = (n_points, *sizes), (block_size, *sizes)
         return ArrayPlan(name, dimensions, shape, chunks, dtype, fill, attributes)
 
-    scalars = scalar_labels(sweep.features.groups)
+    scalars = scalar_labels(sweep)
     node = ("node", sweep.n_nodes)
     tables = [
         plan(

@@ -33,7 +33,12 @@ from chimera_hpc.store.ledger import (
     unfinished,
 )
 from chimera_hpc.store.read import gather, read_series
-from chimera_hpc.store.reduction import Reduction, Variable, read_reduction, write_reduction
+from chimera_hpc.store.reduction import (
+    StoredReduction,
+    Variable,
+    read_reduction,
+    write_reduction,
+)
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import start_run
 from chimera_hpc.store.schema import BLOCK_ARRAYS, scalar_labels, series_mask
@@ -273,7 +278,7 @@ class Store:
     def scalars(self) -> dict[str, NDArray[np.float64]]:
         """Return each quantity over all points by its name; NaN where a point never ran."""
         table = gather(self.files, "scalars", self.scan())
-        labels = scalar_labels(self.sweep.features.groups)
+        labels = scalar_labels(self.sweep)
         return {label: table[:, k] for k, label in enumerate(labels)}
 
     def series(self, i: int) -> NDArray[np.float64]:
@@ -288,7 +293,7 @@ class Store:
 
     # Reduction
 
-    def reduction(self) -> Reduction:
+    def reduction(self) -> StoredReduction:
         """Return what the last reduction stored; BadInput when there is none."""
         return read_reduction(self.path)
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from chimera_hpc.cli import show
-from chimera_hpc.measures import fourier_features
+from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.plot import animation
 from chimera_hpc.plot.spectrum import vertex
 from chimera_hpc.reduction.replay import replay, representative, window_spectrum

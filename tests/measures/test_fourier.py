@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chimera_hpc.base.status import Status
-from chimera_hpc.measures import FEATURES, fourier_features, window_lines
-from chimera_hpc.measures.fourier import wrap
+from chimera_hpc.measures.fourier import FEATURES, fourier_features, window_lines, wrap
 
 T = np.arange(2001) * 0.01
 

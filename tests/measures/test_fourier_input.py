@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.measures import fourier_features
+from chimera_hpc.measures.fourier import fourier_features
 
 T = np.arange(2001) * 0.01
 U = np.cos(4 * np.pi * T[:, None] + np.arange(3))

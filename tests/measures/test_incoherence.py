@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.measures import (
+from chimera_hpc.measures.incoherence import (
+    differences,
     discontinuity_measure,
     local_sigma,
     order_parameter,
@@ -14,7 +15,6 @@ from chimera_hpc.measures import (
     sigma,
     strength_of_incoherence,
 )
-from chimera_hpc.measures.incoherence import differences
 
 # the published vector: z = (-1, 1, 0, 0) and (0, -3, 4, -1)
 X = np.array([[0.0, 1.0, 0.0, 0.0], [2.0, 2.0, 5.0, 1.0]])

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.measures import fourier_features, synthetic_profiles, synthetic_signal
-from chimera_hpc.measures.fourier import wrap
-from chimera_hpc.measures.synthetic import profile_error
+from chimera_hpc.measures.fourier import fourier_features, wrap
+from chimera_hpc.measures.synthetic import profile_error, synthetic_profiles, synthetic_signal
 
 T = 500 + 0.01 * np.arange(50_001)
 

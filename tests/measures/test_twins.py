@@ -9,13 +9,8 @@ import numba
 import numpy as np
 import pytest
 
-from chimera_hpc.measures import (
-    FEATURES,
-    fourier_features,
-    local_sigma,
-    order_parameter,
-    sigma,
-)
+from chimera_hpc.measures.fourier import FEATURES, fourier_features
+from chimera_hpc.measures.incoherence import local_sigma, order_parameter, sigma
 
 CLOCKS = ("ring", "own")
 MEANS = ("circular", "arithmetic")

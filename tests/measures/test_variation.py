@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.measures import fourier_features
+from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.measures.variation import total_variation_arrays, total_variations
 
 ZERO = np.zeros(4)

@@ -20,7 +20,7 @@ from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import build
 from chimera_hpc.job.tables import Integrator, Keep
-from chimera_hpc.measures import local_sigma, order_parameter, range_of, sigma
+from chimera_hpc.measures.incoherence import local_sigma, order_parameter, range_of, sigma
 from chimera_hpc.run import block as task
 from chimera_hpc.run.block import run_block, warm_up
 from chimera_hpc.run.initial_state import initial_state
@@ -70,7 +70,7 @@ def test_numbers_are_those_of_the_library():
     s = sweep("keep.dtype=float32")
     points = s.points()
     result = run_block(s, points)
-    labels = scalar_labels(6)
+    labels = scalar_labels(sweep())
     for i, row in enumerate(points.row(i) for i in range(len(points))):
         model = build(s, row)
         u0, v0 = initial_state(s, row, model)
@@ -110,7 +110,7 @@ def test_distance_is_measured_from_the_centre_in_the_norm_of_the_ball(ball, form
     start, end = (norm(np.concatenate([run.u[i], run.v[i]]) - centre) for i in (0, -1))
     assert start <= 0.1
     assert abs(end - start) > 1e-3
-    distance = run_block(s, s.points()).scalars[0, scalar_labels(6).index("distance")]
+    distance = run_block(s, s.points()).scalars[0, scalar_labels(sweep()).index("distance")]
     assert distance == pytest.approx(end, rel=1e-4)
 
 
@@ -202,7 +202,7 @@ def test_signals_beyond_the_range_of_int16_are_measured_all_the_same():
     assert result.status[0] in (Status.DONE, Status.NO_WINDOW)
     missing = result.series[0] == MISSING
     assert 0 < missing.sum() < missing.size
-    assert result.scalars[0, scalar_labels(6).index("range_u")] > 2 * 3.2767
+    assert result.scalars[0, scalar_labels(sweep()).index("range_u")] > 2 * 3.2767
 
 
 @pytest.mark.parametrize(
@@ -289,7 +289,7 @@ def test_steady_and_oscillating_points_of_the_paper():
     assert (two == Status.STEADY).all()
     assert set(three) == {Status.STEADY, Status.DONE}
     steady = result.status == Status.STEADY
-    std_u = result.scalars[:, scalar_labels(6).index("std_u")]
+    std_u = result.scalars[:, scalar_labels(sweep()).index("std_u")]
     assert (std_u[steady] < 1e-2).all()
     assert (std_u[~steady] > 0.1).all()
     assert np.isnan(result.features[steady]).all()

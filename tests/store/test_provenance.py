@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from chimera_hpc.store import provenance
-from chimera_hpc.store.provenance import differences, gather, git_state, source_digest
+from chimera_hpc.store.provenance import differences, gather, git_state, package_digest
 
 
 def test_a_run_says_who_where_when_with_what() -> None:
@@ -26,7 +26,7 @@ def test_a_run_says_who_where_when_with_what() -> None:
 
 
 def test_gathering_is_quick() -> None:
-    source_digest.cache_clear()
+    package_digest.cache_clear()
     began = time.process_time()
     gather()
     assert time.process_time() - began < 0.3
@@ -70,14 +70,14 @@ def test_outside_a_checkout_or_without_git_there_is_no_commit(
     assert git_state(checkout) is None
 
 
-def test_source_digest_follows_the_code(tmp_path: Path, monkeypatch: Any) -> None:
+def test_package_digest_follows_the_code(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(provenance, "PACKAGE", tmp_path)
     digests = []
     for name, text in (("a.py", "1"), ("a.py", "2"), ("b.py", ""), ("b.txt", "")):
         (tmp_path / name).write_text(text)
-        source_digest.cache_clear()
-        digests.append(source_digest())
-    source_digest.cache_clear()
+        package_digest.cache_clear()
+        digests.append(package_digest())
+    package_digest.cache_clear()
     assert len(set(digests)) == 3
     assert digests[2] == digests[3]
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from store_tools import small_sweep
 
+from chimera_hpc.job import Sweep
 from chimera_hpc.store.schema import (
     FEATURES,
     array_plans,
@@ -24,14 +25,15 @@ from chimera_hpc.store.schema import (
 
 
 def test_labels_are_those_of_the_contract() -> None:
-    from chimera_hpc import measures as features
+    from chimera_hpc.measures import fourier
 
-    assert features.FEATURES == FEATURES
-    assert scalar_labels(2)[:8] == (
+    assert fourier.FEATURES == FEATURES
+    job = {"name": "x", "model": "topological_fhn", "grid": {"P": 3, "Q": 0}}
+    assert scalar_labels(Sweep.from_dict({**job, "features": {"groups": 2}})) == (
         *("V_theta", "V_a", "V_Omega", "sigma_1", "sigma_2"),
-        *("std_u", "range_u", "order_parameter"),
+        *("std_u", "range_u", "order_parameter", "distance"),
+        *("local_sigma_1", "local_sigma_2"),
     )
-    assert scalar_labels(2)[-2:] == ("local_sigma_1", "local_sigma_2")
 
 
 @given(st.lists(st.floats(-5, 5) | st.just(np.nan) | st.just(np.inf), min_size=1))

@@ -54,7 +54,7 @@ def _by_unit(given: AnalysisInput, unit: str) -> dict[str, Any]:
 
 def unit_of(given: AnalysisInput, unit: str) -> Array:
     """What a delta is multiplied with for each run, shape (n,)."""
-    return given.scalars["range_u"] if unit == "range" else np.ones(len(given.status))
+    return given.scalar("range_u") if unit == "range" else np.ones(len(given.status))
 
 
 def _strength(local: Array, scale: Array, delta: float) -> Array:
@@ -97,7 +97,7 @@ def sigma_l(given: AnalysisInput) -> dict[str, Any]:
     the interval of bandwidths with three modes.
     """
     given.need_runs()
-    values = np.where(given.has_result, given.scalars["sigma_1"], np.nan)
+    values = np.where(given.has_result, given.scalar("sigma_1"), np.nan)
     made = density_classes(values)
     rows = []
     for i in range(given.n_cells):
@@ -135,7 +135,7 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
     delta = given.sweep.reduction.deltas[0]
     strength = _strength(given.local_sigma(), scale, delta)
     by_strength: list[str | None] = list(classes_by_incoherence(np.nan_to_num(strength)))
-    density = density_classes(np.where(given.has_result, given.scalars["sigma_1"], np.nan))
+    density = density_classes(np.where(given.has_result, given.scalar("sigma_1"), np.nan))
     by_density = [density.names[k] if k >= 0 else None for k in density.labels]
     methods = {"triplets": triplet, "SI": by_strength, "sigma_1": by_density}
     for names in methods.values():

@@ -31,7 +31,7 @@ def variations(given: AnalysisInput) -> dict[str, Any]:
         runs = (given.cell == i) & (given.status == Status.DONE)
         row: dict[str, Any] = {**given.place(i), "runs": int(runs.sum())}
         for name in names if runs.any() else ():
-            row[name] = np.percentile(given.scalars[name][runs], _LEVELS)
+            row[name] = np.percentile(given.scalar(name)[runs], _LEVELS)
         rows.append(row)
     return {"levels": _LEVELS, "cells": rows}
 

@@ -75,7 +75,7 @@ def stability(given: AnalysisInput) -> dict[str, Any]:
 def basin(given: AnalysisInput) -> dict[str, Any]:
     """f(P, R): share of runs whose last state is inside the ball they began in (fig:stability)."""
     columns = given.points.columns
-    inside = given.scalars["distance"] <= columns["delta"]
+    inside = given.scalar("distance") <= columns["delta"]
     made = basin_map(columns["P"], columns["delta"], inside, given.has_result)
     return {
         "P": made.half_degree,

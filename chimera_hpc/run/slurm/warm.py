@@ -16,7 +16,7 @@ from pathlib import Path
 
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.store.ledger import METADATA
-from chimera_hpc.store.provenance import cpu_model, source_digest
+from chimera_hpc.store.provenance import cpu_model, package_digest
 
 _STORE = "store.zarr"
 
@@ -64,7 +64,7 @@ def _mark(spec: Path) -> Path | None:
     if not folder or not spec.is_file():
         return None
     digest = blake2b(spec.read_bytes(), digest_size=8)
-    for part in (source_digest(), platform.python_version(), version("numba"), cpu_model()):
+    for part in (package_digest(), platform.python_version(), version("numba"), cpu_model()):
         digest.update(f"\0{part}".encode())
     return Path(folder) / f"compiled-{digest.hexdigest()}"
 

@@ -11,13 +11,13 @@ from typing import Any
 
 from chimera_hpc.base.errors import BadInput
 from scoreboard.evidence import Evidence, Missing
-from scoreboard.rules import NOT_DECIDABLE, NOT_REPRODUCED, REPRODUCED, RULES, Verdict
+from scoreboard.rules import NOT_DECIDABLE, NOT_REPRODUCED, REPRODUCED, RULES, Finding
 
 _KEYS = {"id", "where", "says", "rule", "command", "check", "args", "quick"}
 
 
 @dataclass(frozen=True)
-class Claim:
+class PaperClaim:
     """One statement of the paper and how it is judged."""
 
     id: str
@@ -32,15 +32,15 @@ class Claim:
     quick: bool = False
     """Whether it survives thinned grids."""
 
-    def judge(self, evidence: Evidence) -> Verdict:
+    def judge(self, evidence: Evidence) -> Finding:
         """Apply the rule."""
         try:
             return RULES[self.check](evidence, **self.args)
         except Missing as reason:
-            return Verdict(NOT_DECIDABLE, str(reason))
+            return Finding(NOT_DECIDABLE, str(reason))
 
 
-def read_claims(path: str | Path) -> list[Claim]:
+def read_claims(path: str | Path) -> list[PaperClaim]:
     """Read a file of claims; BadInput when one is malformed or an id occurs twice."""
     tables = tomllib.loads(Path(path).read_text())["claim"]
     for table in tables:
@@ -48,13 +48,13 @@ def read_claims(path: str | Path) -> list[Claim]:
             raise BadInput(f"{path}: {table.get('id')}: unknown keys {', '.join(sorted(wrong))}")
         if table.get("check") not in RULES:
             raise BadInput(f"{path}: {table.get('id')}: no rule {table.get('check')}")
-    claims = [Claim(**table) for table in tables]
+    claims = [PaperClaim(**table) for table in tables]
     if twice := [name for name, count in Counter(c.id for c in claims).items() if count > 1]:
         raise BadInput(f"{path}: {twice[0]} occurs twice")
     return claims
 
 
-def scoreboard(claims: Iterable[Claim], evidence: Evidence) -> list[dict[str, Any]]:
+def scoreboard(claims: Iterable[PaperClaim], evidence: Evidence) -> list[dict[str, Any]]:
     """Judge every claim: rows as results.json holds them under ``claims``.
 
     ``reproduced`` is true, false, or None where it can't be decided; ``measured`` then says why.

@@ -23,7 +23,7 @@ REPRODUCED, NOT_REPRODUCED, NOT_DECIDABLE = "reproduced", "not reproduced", "not
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Finding:
     """What was found of one claim."""
 
     outcome: str
@@ -33,19 +33,19 @@ class Verdict:
     """95 % interval, where what was measured is a fraction."""
 
 
-Rule = Callable[..., Verdict]
+Rule = Callable[..., Finding]
 
 
-def verdict(holds: bool, measured: str) -> Verdict:
+def verdict(holds: bool, measured: str) -> Finding:
     """Return a verdict without an interval."""
-    return Verdict(REPRODUCED if holds else NOT_REPRODUCED, measured)
+    return Finding(REPRODUCED if holds else NOT_REPRODUCED, measured)
 
 
-def share(holds: bool, hits: int, trials: int, text: str = "") -> Verdict:
+def share(holds: bool, hits: int, trials: int, text: str = "") -> Finding:
     """Return a verdict on a fraction, with its Wilson interval."""
     low, high = (float(end) for end in wilson_interval(hits, trials))
     words = f"{hits} of {trials}" + (f": {text}" if text else "")
-    return Verdict(REPRODUCED if holds else NOT_REPRODUCED, words, low, high)
+    return Finding(REPRODUCED if holds else NOT_REPRODUCED, words, low, high)
 
 
 def cells_are(
@@ -54,7 +54,7 @@ def cells_are(
     cut: int,
     expect: Sequence[Mapping[str, Any]],
     at_least: int | None = None,
-) -> Verdict:
+) -> Finding:
     """Cells have the modal class that is expected: all of them, or `at_least` so many.
 
     Each of `expect` has ``class`` and coordinates. Steady runs count as ordered.
@@ -74,7 +74,7 @@ def cells_are(
 
 def only_there(
     evidence: Evidence, job: str, cut: int, axis: str, values: Any, of_class: str
-) -> Verdict:
+) -> Finding:
     """No cell outside these values of an axis has the class (a class, or a numbered sub-class)."""
     numbered = of_class != base_of(of_class)
     key = "class" if numbered else "family"
@@ -96,7 +96,7 @@ def number(
     at_most: float | None = None,
     above: float | None = None,
     below: float | None = None,
-) -> Verdict:
+) -> Finding:
     """A number of results.json lies within bounds."""
     value = evidence.value(job, path)
     if value is None:
@@ -108,7 +108,7 @@ def number(
 
 def cluster_order(
     evidence: Evidence, job: str, cut: int, quantity: str, rising: Sequence[str]
-) -> Verdict:
+) -> Finding:
     """The centroids of the classes rise in this order."""
     clusters = evidence.job(job)["cuts"][str(cut)]["clusters"]
     centre = {cluster["name"]: cluster["centroid"][quantity] for cluster in clusters}
@@ -125,7 +125,7 @@ def splits(
     step: int,
     is_class: str | None = None,
     never: str | None = None,
-) -> Verdict:
+) -> Finding:
     """Which class parts at a step below three classes (1: four classes); or one never does."""
     order = [split["class"] for split in evidence.value(job, "clustering/order_of_splits")[:step]]
     if len(order) < step:
@@ -134,7 +134,7 @@ def splits(
     return verdict(order[-1] == is_class if never is None else never not in order, text)
 
 
-def n_classes(evidence: Evidence, job: str, cut: int, count: int) -> Verdict:
+def n_classes(evidence: Evidence, job: str, cut: int, count: int) -> Finding:
     """A cut has this many classes; counted, not asked for."""
     made = evidence.job(job)["cuts"]
     found = [len(c["clusters"]) for k, c in made.items() if str(cut) == k]
@@ -144,7 +144,7 @@ def n_classes(evidence: Evidence, job: str, cut: int, count: int) -> Verdict:
     return verdict(found[0] == count, f"{found[0]} classes")
 
 
-def depth_gives(evidence: Evidence, job: str, depth: float, count: int) -> Verdict:
+def depth_gives(evidence: Evidence, job: str, depth: float, count: int) -> Finding:
     """A line across the tree at this depth makes so many classes."""
     made = evidence.job(job)["cuts"]
     at_depth = [cut for cut in made.values() if abs(cut["depth"] - depth) < 1e-9]
@@ -153,7 +153,7 @@ def depth_gives(evidence: Evidence, job: str, depth: float, count: int) -> Verdi
     return verdict(found == count, f"classes: {text}")
 
 
-def sub_class_count(evidence: Evidence, job: str, cut: int, of_class: str, count: int) -> Verdict:
+def sub_class_count(evidence: Evidence, job: str, cut: int, of_class: str, count: int) -> Finding:
     """A class has this many sub-classes in a cut."""
     clusters = evidence.job(job)["cuts"].get(str(cut), {}).get("clusters", [])
     names = [cluster["name"] for cluster in clusters]
@@ -163,7 +163,7 @@ def sub_class_count(evidence: Evidence, job: str, cut: int, of_class: str, count
     return verdict(found == count, f"classes: {', '.join(names)}")
 
 
-def differ(evidence: Evidence, job: str, cut: int, first: Cell, second: Cell) -> Verdict:
+def differ(evidence: Evidence, job: str, cut: int, first: Cell, second: Cell) -> Finding:
     """Two cells have different modal classes of one family."""
     cells = evidence.cells(job, cut)
     one, other = select(cells, first)[0], select(cells, second)[0]
@@ -175,7 +175,7 @@ def differ(evidence: Evidence, job: str, cut: int, first: Cell, second: Cell) ->
 
 def triplet(
     evidence: Evidence, job: str, where: Cell, values: Sequence[float], quantities: Sequence[str]
-) -> Verdict:
+) -> Finding:
     """Printed values lie within the middle 95 % of the runs of a cell, each for itself."""
     rows = evidence.value(job, "curves/variations/cells")
     row = select(rows, where)[0]
@@ -189,7 +189,7 @@ def triplet(
     return verdict(inside == len(values), "median (middle 95 %): " + ", ".join(words))
 
 
-def rising_medians(evidence: Evidence, job: str, quantity: str, order: Sequence[Cell]) -> Verdict:
+def rising_medians(evidence: Evidence, job: str, quantity: str, order: Sequence[Cell]) -> Finding:
     """The median of a quantity rises from cell to cell."""
     rows = evidence.value(job, "curves/variations/cells")
     medians = [select(rows, where)[0][quantity][3] for where in order]
@@ -197,7 +197,7 @@ def rising_medians(evidence: Evidence, job: str, quantity: str, order: Sequence[
     return verdict(bool(np.all(np.diff(medians) > 0)), f"medians {text}")
 
 
-def still(evidence: Evidence, job: str, where: Cell, strictly: bool = False) -> Verdict:
+def still(evidence: Evidence, job: str, where: Cell, strictly: bool = False) -> Finding:
     """No run of a cell oscillates; strictly: none moves at all."""
     cells = select(evidence.value(job, "curves/oscillation/cells"), where)
     names = ("oscillating", "moving", "runs")
@@ -212,7 +212,7 @@ def safe_radius(
     degrees: Any,
     at_least: float,
     at_most: float,
-) -> Verdict:
+) -> Finding:
     """The largest radius up to which f = 1, as a median over these P, lies between bounds."""
     found = _radii(evidence, job, degrees)
     middle = float(np.median(found))
@@ -220,7 +220,7 @@ def safe_radius(
     return verdict(at_least <= middle <= at_most, text)
 
 
-def radii_compare(evidence: Evidence, job: str, larger: Any, smaller: Any) -> Verdict:
+def radii_compare(evidence: Evidence, job: str, larger: Any, smaller: Any) -> Finding:
     """The median largest radius with f = 1 is larger for some P than for others."""
     first, second = (float(np.median(_radii(evidence, job, d))) for d in (larger, smaller))
     return verdict(first > second, f"R = {first:.2f} against {second:.2f}")
@@ -237,7 +237,7 @@ def _radii(evidence: Evidence, job: str, degrees: Any) -> list[float]:
 
 def basins_agree(
     evidence: Evidence, first: str, second: str, within: float, at_least: float
-) -> Verdict:
+) -> Finding:
     """f(P, R) of two jobs differ by no more than `within` in a share of the cells."""
     one, other = (np.array(evidence.value(j, "curves/basin/fraction")) for j in (first, second))
     near = np.abs(one.astype(float) - other.astype(float)) <= within + 1e-12
@@ -246,7 +246,7 @@ def basins_agree(
 
 def judged(
     evidence: Evidence, job: str, where: Cell, is_class: str, exceptions: int = 0
-) -> Verdict:
+) -> Finding:
     """Cells are judged by the atlas to be of a class, with so many exceptions.
 
     Steady runs count as ordered.
@@ -261,7 +261,7 @@ def judged(
 
 def transition(
     evidence: Evidence, job: str, where: Cell, into: str, low: float, high: float
-) -> Verdict:
+) -> Finding:
     """Along the axis the class changes into `into` for good between `low` and `high`.
 
     The transition is the middle between the last cell of another class and the next one.
@@ -277,7 +277,7 @@ def transition(
     return verdict(low <= middle <= high, f"{axis} = {middle:.3g}")
 
 
-def extreme_is(evidence: Evidence, job: str, where: Cell, axis: str, is_class: str) -> Verdict:
+def extreme_is(evidence: Evidence, job: str, where: Cell, axis: str, is_class: str) -> Finding:
     """The cell with the largest value of an axis is of a class."""
     last = max(select(_judged(evidence, job), where), key=lambda cell: cell[axis])
     text = f"{axis} = {last[axis]:.3g} is {last['family']} ({last['votes']})"
@@ -303,7 +303,7 @@ def share_of_chimeras(
     until: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
-) -> Verdict:
+) -> Finding:
     """W at a number of reversed links, or everywhere from `flips` to `until`, is within bounds."""
     curve = _curve(evidence, job)
     x = np.array(curve["x"])
@@ -320,7 +320,7 @@ def share_of_chimeras(
 
 def threshold_ratio(
     evidence: Evidence, first: str, second: str, at_least: float, at_most: float
-) -> Verdict:
+) -> Finding:
     """Ratio of the numbers of reversed links at which W falls below one half."""
     one, other = (_curve(evidence, job)["half_at"] for job in (first, second))
     if one is None or other is None or not other:
@@ -335,7 +335,7 @@ def _curve(evidence: Evidence, job: str) -> dict[str, Any]:
     return curve
 
 
-def strength_is(evidence: Evidence, job: str, delta: float, where: Cell, is_class: str) -> Verdict:
+def strength_is(evidence: Evidence, job: str, delta: float, where: Cell, is_class: str) -> Finding:
     """By the strength of incoherence the modal class of these cells is this one."""
     rows = _strengths(evidence, job, delta)
     chosen = select(rows, where)
@@ -356,7 +356,7 @@ def _strengths(evidence: Evidence, job: str, delta: float) -> list[dict[str, Any
     raise Missing(f"the job {job} has no delta = {delta}")
 
 
-def methods_agree(evidence: Evidence, job: str, pair: int, at_least: int) -> Verdict:
+def methods_agree(evidence: Evidence, job: str, pair: int, at_least: int) -> Finding:
     """Two methods give at least so many cells the same modal class."""
     made = evidence.value(job, f"curves/agreement/pairs/{pair}")
     if made["cells"] < at_least:
@@ -365,13 +365,13 @@ def methods_agree(evidence: Evidence, job: str, pair: int, at_least: int) -> Ver
     return share(made["cells_equal"] >= at_least, made["cells_equal"], made["cells"], text)
 
 
-def reoriented(evidence: Evidence, job: str, panel: int, count: int) -> Verdict:
+def reoriented(evidence: Evidence, job: str, panel: int, count: int) -> Finding:
     """A drawing of the ring has this many reoriented links."""
     found = evidence.value(job, f"curves/networks/panels/{panel}/reoriented")
     return verdict(found == count, f"{found} links")
 
 
-def orientation_without_effect(evidence: Evidence, within: float) -> Verdict:
+def orientation_without_effect(evidence: Evidence, within: float) -> Finding:
     """With b = 0 both orientations give the same u, when the links start from the same state.
 
     A link's signal changes its sign with the link's orientation. P = 12, 50 nodes, t to 5.
@@ -389,7 +389,7 @@ def orientation_without_effect(evidence: Evidence, within: float) -> Verdict:
     return verdict(gap <= within, f"largest difference {gap:.1e}")
 
 
-def undecidable(evidence: Evidence, why: str) -> Verdict:
+def undecidable(evidence: Evidence, why: str) -> Finding:
     """The paper does not say enough to judge."""
     raise Missing(why)
 
