@@ -36,7 +36,7 @@ from chimera_hpc.reduction.audit_runs import WAYS, Runs, compute_again, describe
 from chimera_hpc.reduction.cells import free_axes
 from chimera_hpc.reduction.results import TRIPLET, count_points, json_safe, read_results, to_json
 from chimera_hpc.store.labelled import STORE_NAME
-from chimera_hpc.store.reduction import Reduction
+from chimera_hpc.store.reduction import StoredReduction
 from chimera_hpc.store.store import Store
 
 Integers = NDArray[np.int64]
@@ -237,7 +237,7 @@ def basis_of(
     return Basis(store, ledger, cuts, judge, judge.labels(runs, radius))
 
 
-def _other_atlas(stored: Reduction) -> dict[str, Atlas]:
+def _other_atlas(stored: StoredReduction) -> dict[str, Atlas]:
     first = stored.attributes.get("judge_0")
     if first is None:
         return {}
