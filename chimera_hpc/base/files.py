@@ -16,7 +16,7 @@ import uuid
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from chimera_hpc.base.processes import is_gone, process_mark
+from chimera_hpc.base.processes import is_gone, process_identity
 
 HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
 """Errors that the next write would run into as well."""
@@ -27,7 +27,7 @@ LEFTOVER_AGE = 3600.0
 
 def temporary_name(path: Path) -> Path:
     """Return a fresh name beside `path` that tells which process it belongs to."""
-    return path.with_name(f".{path.name}.{process_mark()}.{uuid.uuid4().hex[:8]}{_SUFFIX}")
+    return path.with_name(f".{path.name}.{process_identity()}.{uuid.uuid4().hex[:8]}{_SUFFIX}")
 
 
 def write_atomically(path: Path, data: bytes) -> None:

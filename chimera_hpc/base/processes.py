@@ -11,7 +11,7 @@ from pathlib import Path
 _PROC = Path("/proc")
 
 
-def process_mark() -> str:
+def process_identity() -> str:
     """Return ``machine-pid-start`` of this process, unique over reboots and reuse of numbers.
 
     It may stand in a file name. `start` is the kernel's start time of the process in clock ticks

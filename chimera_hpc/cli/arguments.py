@@ -16,7 +16,8 @@ from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.job.shipped import job_file
 from chimera_hpc.job.tables import Slurm
-from chimera_hpc.run.driver import CLUSTERS, Place
+from chimera_hpc.run.choice import CLUSTERS, ExecutorChoice
+from chimera_hpc.run.fork_server import start_fork_server
 
 if TYPE_CHECKING:
     from chimera_hpc.store.store import Store
@@ -96,7 +97,7 @@ def find_points(store: Store, words: Sequence[str]) -> list[int]:
     return [int(i) for i in found]
 
 
-def add_place(parser: ArgumentParser) -> None:
+def add_executor(parser: ArgumentParser) -> None:
     """Add where the work is done."""
     parser.add_argument(
         "--cluster",
@@ -152,7 +153,7 @@ def add_reduction(parser: ArgumentParser) -> None:
     )
 
 
-def place_of(args: Namespace, sweep: Sweep, store: Path) -> Place:
+def executor_of(args: Namespace, sweep: Sweep, store: Path) -> ExecutorChoice:
     """Return what the arguments say of where the work is done.
 
     SLURM is asked at once whether it would take the jobs of workers on this store.
@@ -168,19 +169,27 @@ def place_of(args: Namespace, sweep: Sweep, store: Path) -> Place:
     if args.memory is not None and not _SIZE.fullmatch(args.memory):
         raise BadInput(f"--memory {args.memory}: a size such as 800MB or 2GB is needed")
     workers = args.workers or sweep.run.workers
-    wishes = slurm_wishes(args, sweep) if args.cluster in ("slurm", "allocation") else None
-    if args.cluster == "slurm" and wishes is not None:
-        from chimera_hpc.run.slurm.workers import check_wishes
+    slurm_options = (
+        slurm_options_of(args, sweep) if args.cluster in ("slurm", "allocation") else None
+    )
+    if args.cluster == "slurm" and slurm_options is not None:
+        from chimera_hpc.run.slurm.workers import check_options
 
-        check_wishes(wishes, store)
-    return Place(args.cluster, workers, args.scheduler_file, args.memory, wishes)
+        check_options(slurm_options, store)
+    return ExecutorChoice(args.cluster, workers, args.scheduler_file, args.memory, slurm_options)
 
 
-def slurm_wishes(args: Namespace, sweep: Sweep) -> Slurm:
+def start_early(args: Namespace) -> None:
+    """Start what local workers are forked from: it imports while this process plans."""
+    if args.cluster == "local":
+        start_fork_server()
+
+
+def slurm_options_of(args: Namespace, sweep: Sweep) -> Slurm:
     """Return what the user's file, the job and the arguments ask of SLURM."""
-    from chimera_hpc.run.slurm.options import wishes
+    from chimera_hpc.run.slurm.options import slurm_options
 
-    return wishes(sweep.slurm, vars(args))
+    return slurm_options(sweep.slurm, vars(args))
 
 
 def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> Sweep:

@@ -42,8 +42,8 @@ def end(driver: Driver, folder: Path, args: Namespace) -> int:
         return end(driver, folder, args)
     for line in (*damage, *failures(store, folder)):
         print(line)
-    for block, trouble in driver.broken.items():
-        print(f"block {block} could not be done: {trouble.text} (more in {driver.log})")
+    for block, error in driver.broken.items():
+        print(f"block {block} could not be done: {error.text} (more in {driver.log})")
     failed = any(n for code, n in store.status().items() if code.is_failure)
     return Exit.FAILURES if failed or damage or driver.broken else Exit.COMPLETE
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import re
 import sys
 import warnings
@@ -14,17 +13,12 @@ from typing import Any, NoReturn
 from chimera_hpc import __version__
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.renaming import IS_RENAMING
-from chimera_hpc.run.fork_server import fork_server
 
 _EXITS = """exit status:
   0 every point has a result; 1 some failed (listed); 2 bad input (one line);
   75 stopped in good order with more to do; 130 Ctrl-C
 """
 
-_OBJECTS = 50_000
-"""New objects after which Python looks for garbage."""
-_WORKING, _LOCAL = ("run", "retry"), "local"
-"""The commands that may start workers, and where they do without being told."""
 _INTERRUPTED = 130
 
 
@@ -59,28 +53,11 @@ def parser(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
-    # Most of what a command imports is no garbage: looking for some takes a tenth of a second.
-    gc.set_threshold(_OBJECTS)
     typed = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        # The workers get ready while the commands are imported.
-        with fork_server(needs_workers(typed)):
-            return _execute(typed)
+        return _execute(typed)
     except KeyboardInterrupt:
         return _INTERRUPTED
-
-
-def needs_workers(typed: Sequence[str]) -> bool:
-    """Return whether a command line is going to start a local cluster, as far as one sees."""
-    if not typed or typed[0] not in _WORKING or not {"-h", "--help"}.isdisjoint(typed):
-        return False
-    # The last one counts, as for the parser: `--cluster NAME` or `--cluster=NAME`, or shortened.
-    place = _LOCAL
-    for word, following in zip(typed, [*typed[1:], ""], strict=True):
-        name, _, given = word.partition("=")
-        if name.startswith("--c") and "--cluster".startswith(name):
-            place = given or following
-    return place == _LOCAL
 
 
 def _execute(typed: list[str]) -> int:
@@ -122,6 +99,4 @@ def _plain_notes() -> Iterator[None]:
 def run() -> NoReturn:
     """Run the command line and leave with its exit status."""
     status = main()
-    # Nor is it when Python ends, which would look through it once more.
-    gc.freeze()
     sys.exit(status)

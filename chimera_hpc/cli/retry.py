@@ -10,11 +10,12 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.cli.arguments import (
+    add_executor,
     add_folder,
     add_overrides,
-    add_place,
     add_reduction,
-    place_of,
+    executor_of,
+    start_early,
     store_path,
 )
 from chimera_hpc.cli.ending import end, interrupted
@@ -53,7 +54,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--time-out", type=float, metavar="S", help="seconds of wall time a point")
     parser.add_argument("--max-steps", type=int, metavar="N", help="steps a point")
     add_overrides(parser)
-    add_place(parser)
+    add_executor(parser)
     add_reduction(parser)
 
 
@@ -66,19 +67,20 @@ def execute(args: Namespace) -> int:
             raise BadInput(f"--{name.replace('_', '-')} {value}: must be above 0")
     with stop_request() as stop:
         try:
+            start_early(args)
             path = store_path(args.folder)
-            from chimera_hpc.run.messages import Again
+            from chimera_hpc.run.messages import RetryPolicy
 
             store = _store(path, args.overrides)
-            again = Again(
+            retry = RetryPolicy(
                 attempts=NO_LIMIT,
                 statuses=statuses,
                 earlier_only=True,
                 time_out=args.time_out,
                 max_steps=args.max_steps,
             )
-            place = place_of(args, store.sweep, path)
-            driver = Driver(store, place, stop, path.parent / "run.log", again, args.strict)
+            executor = executor_of(args, store.sweep, path)
+            driver = Driver(store, executor, stop, path.parent / "run.log", retry, args.strict)
             driver.meanwhile = load_reduction
             driver.work()
             return end(driver, path.parent, args)

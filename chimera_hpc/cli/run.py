@@ -10,15 +10,16 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.cli.arguments import (
     STORE,
     add_block,
+    add_executor,
     add_job,
     add_out,
-    add_place,
     add_reduction,
     add_resubmit,
     add_slurm,
     add_yes,
+    executor_of,
     load_job,
-    place_of,
+    start_early,
     sweep_folder,
 )
 from chimera_hpc.cli.ending import end, interrupted
@@ -46,7 +47,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_job(parser)
     add_out(parser)
-    add_place(parser)
+    add_executor(parser)
     add_slurm(parser)
     add_resubmit(parser)
     add_block(parser)
@@ -58,14 +59,15 @@ def execute(args: Namespace) -> int:
     """Run the sweep of a job file."""
     with stop_request() as stop:
         try:
+            start_early(args)
             sweep = load_job(args.job, args.overrides, args.block)
             folder = sweep_folder(args.out, sweep)
-            place = place_of(args, sweep, folder / STORE)
+            executor = executor_of(args, sweep, folder / STORE)
             store = open_or_plan(folder, sweep, args.yes)
-            from chimera_hpc.run.messages import Again
+            from chimera_hpc.run.messages import RetryPolicy
 
-            again = Again(attempts=sweep.run.attempts)
-            driver = Driver(store, place, stop, folder / "run.log", again, args.strict)
+            retry = RetryPolicy(attempts=sweep.run.attempts)
+            driver = Driver(store, executor, stop, folder / "run.log", retry, args.strict)
             driver.meanwhile = load_reduction
             if not args.no_figures:
                 driver.report = LiveReport(folder, store.n_points)

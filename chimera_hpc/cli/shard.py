@@ -21,7 +21,8 @@ from chimera_hpc.cli.arguments import (
 )
 from chimera_hpc.cli.resubmitting import go_on
 from chimera_hpc.cli.run import open_or_plan
-from chimera_hpc.run.driver import Driver, Place
+from chimera_hpc.run.choice import ExecutorChoice
+from chimera_hpc.run.driver import Driver
 from chimera_hpc.run.signals import stop_request
 from chimera_hpc.store.ledger import FAILED
 
@@ -56,15 +57,15 @@ def execute(args: Namespace) -> int:
     share = share_of(args.index, args.of)
     with stop_request() as stop:
         try:
-            from chimera_hpc.run.messages import Again
+            from chimera_hpc.run.messages import RetryPolicy
             from chimera_hpc.store.store import Store
 
             path = _store_path(args.folder, args.out, args.overrides)
             store = Store.open(path)
             log = path.parent / "slurm" / f"shard-{share[0]}.log"
             log.parent.mkdir(exist_ok=True)
-            again = Again(attempts=store.sweep.run.attempts)
-            driver = Driver(store, Place("serial", share=share), stop, log, again)
+            retry = RetryPolicy(attempts=store.sweep.run.attempts)
+            driver = Driver(store, ExecutorChoice("serial", share=share), stop, log, retry)
             driver.work()
             return go_on(_end(driver), driver, args.resubmit)
         except KeyboardInterrupt:
@@ -112,13 +113,13 @@ def _failed_points(store: Store, index: int, of: int) -> int:
 def _end(driver: Driver) -> int:
     """Say how the share went, and return the exit status."""
     left = driver.pending()
-    index, of = driver.place.share or (0, 1)
+    index, of = driver.executor.share or (0, 1)
     name = f"share {index} of {of}"
     if driver.ended_by or (driver.stop() and left):
         print(f"{name}: stopped with {len(left)} blocks left: {driver.ended_by or 'as asked'}")
         return Exit.MORE_TO_DO if driver.ended_by else driver.stop.exit_status
-    for block, trouble in driver.broken.items():
-        print(f"block {block} could not be done: {trouble.text} (more in {driver.log})")
+    for block, error in driver.broken.items():
+        print(f"block {block} could not be done: {error.text} (more in {driver.log})")
     failed = _failed_points(driver.store, index, of)
     print(f"{name}: done" + (f", {failed} points failed" if failed else ""))
     return Exit.FAILURES if failed or driver.broken else Exit.COMPLETE

@@ -18,7 +18,7 @@ from chimera_hpc.cli.arguments import (
     add_slurm,
     add_yes,
     load_job,
-    slurm_wishes,
+    slurm_options_of,
     sweep_folder,
 )
 from chimera_hpc.cli.run import open_or_plan
@@ -65,22 +65,22 @@ def add_arguments(parser: ArgumentParser) -> None:
 def execute(args: Namespace) -> int:
     """Print or submit."""
     sweep = load_job(args.job, args.overrides, args.block)
-    wishes = slurm_wishes(args, sweep)
-    _check_times(args, wishes)
+    slurm_options = slurm_options_of(args, sweep)
+    _check_times(args, slurm_options)
     target = _target(args, sweep)
     if not args.submit:
-        print(SCRIPTS[args.mode](target, wishes), end="")
+        print(SCRIPTS[args.mode](target, slurm_options), end="")
         return Exit.COMPLETE
     try:
-        return _submit_all(args, sweep, target, wishes)
+        return _submit_all(args, sweep, target, slurm_options)
     except SlurmFailed as error:
         raise BadInput(str(error)) from None
 
 
-def _check_times(args: Namespace, wishes: Slurm) -> None:
+def _check_times(args: Namespace, slurm_options: Slurm) -> None:
     if args.resubmit < 0:
         raise BadInput(f"--resubmit {args.resubmit}: allowed is 0 or more")
-    limit = limit_seconds(wishes.time or TIME)
+    limit = limit_seconds(slurm_options.time or TIME)
     # A job that is over before it begins would be put back into the queue for nothing.
     if args.drain is not None and not 0 <= args.drain < limit:
         raise BadInput(f"--drain {args.drain:g}: allowed is 0 up to the time limit, {limit:g} s")
@@ -103,16 +103,16 @@ def _target(args: Namespace, sweep: Sweep) -> Target:
     )
 
 
-def _submit_all(args: Namespace, sweep: Sweep, target: Target, wishes: Slurm) -> int:
-    queue.check(SCRIPTS[args.mode](target, wishes.model_copy(update={"array": 1})))
+def _submit_all(args: Namespace, sweep: Sweep, target: Target, slurm_options: Slurm) -> int:
+    queue.check(SCRIPTS[args.mode](target, slurm_options.model_copy(update={"array": 1})))
     store = open_or_plan(target.folder, sweep, args.yes)
     if args.mode == "array":
-        wishes = _fitting(wishes, store.n_blocks)
-    first = job = _submit(target, args.mode, wishes)
+        slurm_options = _fitting(slurm_options, store.n_blocks)
+    first = job = _submit(target, args.mode, slurm_options)
     print(f"submitted job {job} ({args.mode}); logs in {target.logs}")
     if args.mode == "array" and not args.no_reduce:
         last = replace(target, name=job_name(store.path, "reduce"))
-        job = _submit(last, "reduce", wishes, f"--dependency=afterany:{job}")
+        job = _submit(last, "reduce", slurm_options, f"--dependency=afterany:{job}")
         print(f"submitted job {job} (reduce)")
     reason = queue.waits_for(first, target.name)
     if reason is not None:
@@ -120,22 +120,22 @@ def _submit_all(args: Namespace, sweep: Sweep, target: Target, wishes: Slurm) ->
     return Exit.COMPLETE
 
 
-def _submit(target: Target, mode: str, wishes: Slurm, *options: str) -> str:
+def _submit(target: Target, mode: str, slurm_options: Slurm, *options: str) -> str:
     # The same job twice would do no harm, and no good either.
     working = queue.jobs(target.name)
     if working:
         raise BadInput(f"job {working[0].id} does this already; the command cancel ends it")
     path = target.folder / LOGS / f"{mode}.sbatch"
     path.parent.mkdir(exist_ok=True)
-    write_atomically(path, SCRIPTS[mode](target, wishes).encode())
+    write_atomically(path, SCRIPTS[mode](target, slurm_options).encode())
     queue.check(path.read_text(), *options)
     return queue.submit(path, *options, name=target.name)
 
 
-def _fitting(wishes: Slurm, n_blocks: int) -> Slurm:
-    """Return the wishes with as many elements as there are blocks and SLURM allows, at most."""
-    wanted = wishes.array or ARRAY
+def _fitting(slurm_options: Slurm, n_blocks: int) -> Slurm:
+    """Return the options with no more array elements than there are blocks and SLURM allows."""
+    wanted = slurm_options.array or ARRAY
     most = min(n_blocks, queue.most_array_elements() or n_blocks)
     if wanted > most:
         print(f"{most} elements in place of {wanted}: there are {n_blocks} blocks")
-    return wishes.model_copy(update={"array": min(wanted, most)})
+    return slurm_options.model_copy(update={"array": min(wanted, most)})

@@ -121,14 +121,6 @@ def compile_uncached(signature: Any, function: Callable[..., Any]) -> Any:
     return _numba().njit(signature, **OPTIONS)(function)
 
 
-def load_registries() -> None:
-    """Have numba read what it knows of functions, which it otherwise does for the first kernel."""
-    from numba.core.registry import cpu_target
-
-    cpu_target.typing_context.refresh()
-    cpu_target.target_context.refresh()
-
-
 def _numba() -> Any:
     # Typed loosely: numba's annotations do not know its configuration.
     return import_module("numba")

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
-from chimera_hpc.integrate.beside import stepping_loops_beside
 from chimera_hpc.integrate.lanes import Control, Outcome, Stopped, integrate
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.job import Points, Sweep
@@ -226,15 +225,15 @@ def warm_up(sweep: Sweep, points: Points) -> None:
     """
     tableau = method(sweep.integrator.method)
     model = build(sweep, points.row(0))
-    with stepping_loops_beside():
-        _warm_up_the_rest(sweep, model)
+    warm_up_features(sweep, model)
     state = model.state(*initial_state(sweep, points.row(0), model))
     control = Control(t_end=0.02, start=0.0, step=0.01, method=tableau)
     for lanes in (1, LANES):
         integrate([model], [state], control, model.n_rows, lambda *_: None, lanes=lanes)
 
 
-def _warm_up_the_rest(sweep: Sweep, model: Model) -> None:
+def warm_up_features(sweep: Sweep, model: Model) -> None:
+    """Compile the right-hand side and every kernel but the stepping loops, or read them."""
     # Compiled, or read from the disk, when it is first asked for.
     _ = model.right_hand_side
     t = 0.01 * np.arange(2000.0)

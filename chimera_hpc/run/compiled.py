@@ -1,50 +1,92 @@
-"""Whether the kernels of a sweep are on the disk: a driver need not load them to find out."""
+"""Which kernels are on the disk already: a process need not load numba to find out.
+
+A file next to the compiled kernels names them. Its own name depends on all that decides which
+kernels a sweep needs.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.files import write_atomically
+from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.integrate.jit import cache_folder, kernel_sources
-from chimera_hpc.job import Points, Sweep
 from chimera_hpc.store.provenance import PACKAGE, cpu_model
+
+if TYPE_CHECKING:
+    from chimera_hpc.job import Points, Sweep
 
 _DECIDING = ("model", "fixed", "integrator", "features", "keep")
 """Tables of a sweep that decide which kernels it needs, together with the names of its axes."""
 
 
+_STEPPING_LOOPS = """
+from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.integrate.stepper import advance
+for lanes in (1, LANES):
+    advance(lanes)
+"""
+
+
 def compile_once(sweep: Sweep, points: Points, *, load: bool) -> None:
-    """Compile what the sweep's points need, unless a mark beside the kernels says that it was done.
+    """Compile the kernels that the sweep's points need, unless they are known to be on the disk.
 
     Parameters
     ----------
     sweep, points
-        As in `task.warm_up`.
+        As in `block.warm_up`.
     load : bool
         Whether this process needs the kernels itself.
     """
-    mark = _mark(sweep)
-    # A model of the user's own may be edited at any time.
-    known = ":" not in sweep.model and _holds(mark)
+    spec = sweep.to_dict()
+    known = is_compiled(spec)
     if known and not load:
         return
     from chimera_hpc.run.block import warm_up
 
+    if not known and usable_cores() > 1:
+        _compile_in_two_processes(sweep, points)
     warm_up(sweep, points)
     if not known:
         with suppress(OSError):
-            write_atomically(mark, json.dumps(sorted(_kernels())).encode())
+            write_atomically(_record(spec), json.dumps(sorted(_kernels())).encode())
 
 
-def _holds(mark: Path) -> bool:
-    """Return whether the kernels that there were when the mark was written are there still."""
+def _compile_in_two_processes(sweep: Sweep, points: Points) -> None:
+    """Compile the stepping loops, half of all there is, in a second process meanwhile.
+
+    Should that fail, this process finds nothing on the disk and compiles them itself.
+    """
+    from chimera_hpc.job.models import build
+    from chimera_hpc.run.block import warm_up_features
+
+    none = subprocess.DEVNULL
+    command = [sys.executable, "-c", _STEPPING_LOOPS]
+    with subprocess.Popen(command, stdin=none, stdout=none, stderr=none) as process:
+        try:
+            warm_up_features(sweep, build(sweep, points.row(0)))
+        except BaseException:
+            process.kill()
+            raise
+
+
+def is_compiled(spec: Mapping[str, Any]) -> bool:
+    """Return whether the kernels that were there after a sweep's compilation are there still.
+
+    `spec` is what `Sweep.to_dict` returns. A user's own model may be edited at any time: False.
+    """
+    if ":" in spec["model"]:
+        return False
     try:
-        return set(json.loads(mark.read_bytes())) <= set(_kernels())
+        return set(json.loads(_record(spec).read_bytes())) <= set(_kernels())
     except (OSError, ValueError, TypeError):
         return False
 
@@ -55,13 +97,12 @@ def _kernels() -> Iterator[str]:
             yield from (file.name for file in os.scandir(folder) if file.name.endswith(".nbc"))
 
 
-def _mark(sweep: Sweep) -> Path:
-    """Return the file that says that the kernels of such sweeps are compiled.
+def _record(spec: Mapping[str, Any]) -> Path:
+    """Return the file that names the kernels of such sweeps.
 
-    numba goes by place and time of the sources and by the processor; the folder stands for their
-    contents, for Python's version and for numba's.
+    numba's cache depends on path and time of the sources and on the processor; the folder's name on
+    their contents, on Python's version and on numba's.
     """
-    spec = sweep.to_dict()
     deciding = [spec.get(name) for name in _DECIDING]
     numbas = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_")}
     times = [file.stat().st_mtime_ns for file in kernel_sources()]

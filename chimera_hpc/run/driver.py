@@ -5,15 +5,13 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import HOPELESS
-from chimera_hpc.base.processes import process_mark
+from chimera_hpc.base.processes import process_identity
 from chimera_hpc.base.status import Status
 from chimera_hpc.run.progress import Reporter
 from chimera_hpc.run.signals import StopRequest
@@ -23,36 +21,16 @@ from chimera_hpc.store.ledger import RESULTS, unfinished
 from chimera_hpc.store.provenance import differences, gather
 
 if TYPE_CHECKING:
-    from distributed import Client
-
-    from chimera_hpc.job.tables import Slurm
-    from chimera_hpc.run.messages import Again, BlockReceipt, Orders, Trouble
+    from chimera_hpc.run.choice import ExecutorChoice
+    from chimera_hpc.run.messages import BlockError, BlockReceipt, RetryPolicy, RunMessage
     from chimera_hpc.store.store import Store
 
-CLUSTERS = ("serial", "local", "scheduler-file", "slurm", "allocation")
-_COMPILE_THEMSELVES = ("slurm", "allocation")
-"""Where each node compiles the kernels; the driver's own machine may be of another type."""
 _CLUSTER_TRIES = 3
 """Times that a cluster may be lost before a block is done."""
 _BLOCK_TRIES = 3
 """Errors of the operating system after which a block is put aside."""
 _LONGEST_WAIT = 10.0
 _RUNS_COMPARED = 20
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where the work is done."""
-
-    kind: str
-    workers: int = 0
-    scheduler_file: Path | None = None
-    memory: str | None = None
-    """Limit a worker, as `800MB`."""
-    wishes: Slurm | None = None
-    """What is asked of SLURM."""
-    share: tuple[int, int] | None = None
-    """Which share of the blocks, of how many: block i belongs to share i modulo their number."""
 
 
 class Refreshing(Protocol):
@@ -67,22 +45,21 @@ class Driver:
     def __init__(
         self,
         store: Store,
-        place: Place,
+        executor: ExecutorChoice,
         stop: StopRequest,
         log: Path,
-        again: Again,
+        retry: RetryPolicy,
         strict: bool = False,
     ) -> None:
-        self.store, self.place, self.stop = store, place, stop
-        self.again, self.strict, self.log = again, strict, log
+        self.store, self.executor, self.stop = store, executor, stop
+        self.retry, self.strict, self.log = retry, strict, log
         self.ended_by: str | None = None
         """What made going on hopeless, on one line."""
-        self.broken: dict[int, Trouble] = {}
+        self.broken: dict[int, BlockError] = {}
         """Blocks that were put aside, and why."""
         self._errors: Counter[int] = Counter()
         self._machines: list[str] = []
         self._late = False
-        self._may_come: Callable[[], bool] = lambda: False
         self.report: Refreshing | None = None
         """Written again from time to time while the work goes on, if given."""
         self.meanwhile: Callable[[], object] | None = None
@@ -105,17 +82,17 @@ class Driver:
 
     def pending(self) -> list[int]:
         """Return the blocks with something to do that were not put aside."""
-        again = self.again
+        retry = self.retry
         blocks = self.store.pending(
-            True, attempts=again.attempts, statuses=again.statuses, before=again.before
+            True, attempts=retry.attempts, statuses=retry.statuses, before=retry.before
         )
-        index, count = self.place.share or (0, 1)
+        index, count = self.executor.share or (0, 1)
         return [b for b in blocks if b not in self.broken and b % count == index]
 
     def _count(self) -> None:
         """Have the reporter count what the ledger says, whoever did it."""
-        again, ledger = self.again, self.store.ledger()
-        to_do = unfinished(ledger, again.attempts, again.statuses, again.before)
+        retry, ledger = self.retry, self.store.ledger()
+        to_do = unfinished(ledger, retry.attempts, retry.statuses, retry.before)
         failed = ~to_do & (ledger["status"] > max(RESULTS))
         self.reporter.count(int((~to_do).sum()), int(failed.sum()))
 
@@ -129,60 +106,52 @@ class Driver:
             if not blocks:
                 say("nothing to compute")
                 return
-            orders = self._start(len(blocks))
+            message = self._start(len(blocks))
         except OSError as error:
             raise _cannot_write(store.path, error) from None
         try:
-            if self.place.kind == "serial":
-                self._serial(orders)
+            if self.executor.kind == "serial":
+                self._serial(message)
             else:
-                self._on_cluster(orders)
+                self._on_cluster(message)
         except OSError as error:
             self.ended_by = f"{error.strerror or error}" + f" ({error.filename})"
         finally:
-            _remove(orders.stop_file)
-            self._record(orders)
+            _remove(message.stop_file)
+            self._record(message)
 
-    def _start(self, n_blocks: int) -> Orders:
+    def _start(self, n_blocks: int) -> RunMessage:
         """Record the run, and compile what it needs."""
         from chimera_hpc.run.compiled import compile_once
-        from chimera_hpc.run.messages import Orders
+        from chimera_hpc.run.messages import RunMessage
 
         store, say = self.store, self.reporter.say
         info = gather(store.sweep.model)
         for line in changes(store, info, self.strict):
             say(line)
-        run = store.start_run({**info, "cluster": self.place.kind})
-        kind = self.place.kind
+        run = store.start_run({**info, "cluster": self.executor.kind})
+        kind = self.executor.kind
         say(f"run {run}: {n_blocks} of {store.n_blocks} blocks to do, {kind}, in {store.path}")
-        if kind not in _COMPILE_THEMSELVES:
+        if self.executor.compiles_here:
             began = time.perf_counter()
             compile_once(store.sweep, store.points, load=kind == "serial")
             self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
-        self.again = self.again.of_run(run)
-        return Orders(store.path, run, self.again, process_mark())
+        self.retry = self.retry.of_run(run)
+        return RunMessage(store.path, run, self.retry, process_identity())
 
-    def _serial(self, orders: Orders) -> None:
+    def _serial(self, message: RunMessage) -> None:
         from chimera_hpc.run.executors import run_serial
 
         for blocks in self._rounds():
-            run_serial(
-                *(orders, self._in_time(blocks), lambda r: self._note(orders, r)), self.should_stop
-            )
+            run_serial(message, self._in_time(blocks), self._receiver(message), self.should_stop)
 
-    def _on_cluster(self, orders: Orders) -> None:
-        from chimera_hpc.run.executors import ClusterLost, run_dask
+    def _on_cluster(self, message: RunMessage) -> None:
+        from chimera_hpc.run.executors import ClusterLost
 
-        patience, losses, done = self.store.sweep.run.patience, 0, self.reporter.done
+        losses, done = 0, self.reporter.done
         while losses < _CLUSTER_TRIES:
             try:
-                with self._cluster(patience) as client:
-                    for blocks in self._rounds():
-                        run_dask(
-                            *(client, orders, self._in_time(blocks)),
-                            *(lambda r: self._note(orders, r), self.should_stop),
-                            *(patience, lambda: self._may_come()),
-                        )
+                self._on_one_cluster(message)
                 return
             except ClusterLost as error:
                 losses = 1 if self.reporter.done > done else losses + 1
@@ -197,35 +166,26 @@ class Driver:
                 return
         self.ended_by = "the cluster was lost again and again"
 
-    @contextmanager
-    def _cluster(self, patience: float) -> Iterator[Client]:
-        place, say = self.place, self.reporter.say
-        from chimera_hpc.run.local_cluster import existing_cluster, local_cluster
+    def _on_one_cluster(self, message: RunMessage) -> None:
+        from chimera_hpc.run.executors import run_dask
 
-        if place.kind == "slurm" and place.wishes is not None:
-            from chimera_hpc.run.slurm.workers import slurm_cluster
+        patience, n_blocks = self.store.sweep.run.patience, len(self.pending())
+        with self.executor.cluster(
+            self.store.path, n_blocks, self.reporter.say, patience, self.meanwhile
+        ) as (client, may_come):
+            for blocks in self._rounds():
+                run_dask(
+                    client,
+                    message,
+                    self._in_time(blocks),
+                    self._receiver(message),
+                    self.should_stop,
+                    patience,
+                    may_come,
+                )
 
-            blocks = len(self.pending())
-            with slurm_cluster(place.wishes, self.store.path, blocks, say, patience) as both:
-                client, keeper = both
-                self._may_come = keeper.coming
-                yield client
-        elif place.kind == "allocation" and place.wishes is not None:
-            from chimera_hpc.run.slurm.allocation import allocation_cluster
-
-            with allocation_cluster(place.wishes, self.store.path, say, patience) as client:
-                yield client
-        elif place.scheduler_file is not None:
-            with existing_cluster(place.scheduler_file, patience=patience) as client:
-                yield client
-        else:
-            with local_cluster(
-                place.workers,
-                patience=patience,
-                memory_limit=place.memory or "auto",
-                meanwhile=self.meanwhile,
-            ) as client:
-                yield client
+    def _receiver(self, message: RunMessage) -> Callable[[BlockReceipt], None]:
+        return lambda receipt: self._note(message, receipt)
 
     def _in_time(self, blocks: list[int]) -> Iterator[int]:
         """Yield blocks as long as none has turned out to be too long for the job's time."""
@@ -264,15 +224,15 @@ class Driver:
         while time.monotonic() < until and not self.should_stop():
             time.sleep(0.05)
 
-    def _note(self, orders: Orders, receipt: BlockReceipt) -> None:
+    def _note(self, message: RunMessage, receipt: BlockReceipt) -> None:
         """Take a receipt to the books."""
         if receipt.machine and receipt.machine not in self._machines:
             self._machines.append(receipt.machine)
-            self._record(orders)
-        if receipt.trouble is not None:
-            self._note_trouble(receipt.block, receipt.trouble)
+            self._record(message)
+        if receipt.error is not None:
+            self._note_error(receipt.block, receipt.error)
         # A worker that is a job of its own is followed by another one.
-        self._late |= receipt.late and self.place.kind != "slurm"
+        self._late |= receipt.late and self.executor.kind != "slurm"
         if not receipt.taken:
             self.reporter.note(
                 f"block {receipt.block}: {receipt.n_done} done, {receipt.n_failed} failed, "
@@ -282,25 +242,25 @@ class Driver:
         if self.report is not None:
             self.report.refresh(self.reporter.note)
 
-    def _record(self, orders: Orders) -> None:
+    def _record(self, message: RunMessage) -> None:
         """Write beside the run's record where its points were computed, and until when."""
         from chimera_hpc.store.runs import record_work
 
         now = datetime.now(UTC).isoformat(timespec="seconds")
         try:
-            record_work(orders.store, orders.run, {"machines": self._machines, "until": now})
+            record_work(message.store, message.run, {"machines": self._machines, "until": now})
         except OSError:
             # A disk that is full will be heard of from the blocks.
             return
 
-    def _note_trouble(self, block: int, trouble: Trouble) -> None:
-        self.reporter.note(f"block {block}: {trouble.trace}")
+    def _note_error(self, block: int, error: BlockError) -> None:
+        self.reporter.note(f"block {block}: {error.trace}")
         self._errors[block] += 1
-        if trouble.errno in HOPELESS:
-            self.ended_by = self.ended_by or trouble.text
-        elif trouble.errno is None or self._errors[block] >= _BLOCK_TRIES:
-            self.broken[block] = trouble
-            self.reporter.say(f"block {block} is put aside: {trouble.text}")
+        if error.errno in HOPELESS:
+            self.ended_by = self.ended_by or error.text
+        elif error.errno is None or self._errors[block] >= _BLOCK_TRIES:
+            self.broken[block] = error
+            self.reporter.say(f"block {block} is put aside: {error.text}")
 
 
 def changes(store: Store, info: dict[str, Any], strict: bool) -> list[str]:

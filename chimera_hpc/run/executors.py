@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING
 
-from chimera_hpc.run.messages import BlockReceipt, Orders, Trouble, tell_to_stop
+from chimera_hpc.run.messages import BlockError, BlockReceipt, RunMessage, tell_to_stop
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -36,27 +36,27 @@ class ClusterLost(RuntimeError):
 
 
 def do_block(
-    orders: Orders, block: int, local_stop: Callable[[], bool] | None = None
+    message: RunMessage, block: int, local_stop: Callable[[], bool] | None = None
 ) -> BlockReceipt:
     """Do a block in this process, which loads what integrates first; see `work.do_block`."""
     from chimera_hpc.run import work
 
-    return work.do_block(orders, block, local_stop)
+    return work.do_block(message, block, local_stop)
 
 
 def run_serial(
-    orders: Orders, blocks: Iterable[int], on_receipt: OnReceipt, should_stop: ShouldStop
+    message: RunMessage, blocks: Iterable[int], on_receipt: OnReceipt, should_stop: ShouldStop
 ) -> None:
     """Do the blocks one after the other in this process."""
     for block in blocks:
         if should_stop():
             return
-        on_receipt(do_block(orders, block, should_stop))
+        on_receipt(do_block(message, block, should_stop))
 
 
 def run_dask(
     client: Client,
-    orders: Orders,
+    message: RunMessage,
     blocks: Iterable[int],
     on_receipt: OnReceipt,
     should_stop: ShouldStop,
@@ -71,10 +71,10 @@ def run_dask(
     Parameters
     ----------
     client : Client
-    orders, blocks, on_receipt
+    message, blocks, on_receipt
         As in `run_serial`.
     should_stop : callable
-        Asked twice a second. When true, the workers are told through the orders' stop file, and
+        Asked twice a second. When true, the workers are told through the message's stop file, and
         what they have done so far is waited for.
     patience : float
         Seconds of waiting for workers that were told to stop.
@@ -87,7 +87,7 @@ def run_dask(
     ClusterLost
         When the scheduler went away, or there was no worker for `NO_WORKER_SECONDS`.
     """
-    _Window(client, orders, blocks, patience, may_come).run(on_receipt, should_stop)
+    _Window(client, message, blocks, patience, may_come).run(on_receipt, should_stop)
 
 
 class _Window:
@@ -96,12 +96,12 @@ class _Window:
     def __init__(
         self,
         client: Client,
-        orders: Orders,
+        message: RunMessage,
         blocks: Iterable[int],
         patience: float,
         may_come: Callable[[], bool],
     ) -> None:
-        self.client, self.orders, self.patience = client, orders, patience
+        self.client, self.message, self.patience = client, message, patience
         self.may_come = may_come
         self.waiting: Iterator[int] = iter(blocks)
         self.flying: dict[Future[BlockReceipt], int] = {}
@@ -117,7 +117,7 @@ class _Window:
         while self.flying:
             if stopping is None and should_stop():
                 stopping = time.monotonic()
-                tell_to_stop(self.orders)
+                tell_to_stop(self.message)
             for future in self.take_landed():
                 block = self.flying.pop(future)
                 receipt = self.receipt(future, block)
@@ -136,8 +136,8 @@ class _Window:
         # The key is new each time: the scheduler shall not remember how often a block failed.
         future = self.client.submit(
             do_block,
-            *(self.orders, block),
-            key=f"block-{block}-{self.orders.run}-{self.submitted}-{id(self)}",
+            *(self.message, block),
+            key=f"block-{block}-{self.message.run}-{self.submitted}-{id(self)}",
             pure=False,
         )
         self.flying[future] = block
@@ -175,7 +175,7 @@ class _Window:
         if isinstance(error, KilledWorker):
             return None
         text = " ".join(f"{type(error).__name__}: {error}".split())
-        return BlockReceipt(block, trouble=Trouble(text, text))
+        return BlockReceipt(block, error=BlockError(text, text))
 
     def look_after(self) -> None:
         """Count the workers from time to time, and see to it that there are any."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.processes import usable_cores
-from chimera_hpc.run.fork_server import METHOD, ONE_THREAD, environment, is_running, quiet_tracker
+from chimera_hpc.run.fork_server import ONE_THREAD, signals_blocked, start_fork_server
 
 if TYPE_CHECKING:
     from distributed import Client, Scheduler, SpecCluster
@@ -105,12 +105,14 @@ def local_cluster(
             "silence_logs": logging.CRITICAL,
         },
     }
-    with dask.config.set(settings(patience) | _starting()), environment(quiet_tracker()):
-        cluster = SpecCluster(
-            scheduler={"cls": _calm_scheduler(patience), "options": listening},
-            workers=dict.fromkeys(range(workers or usable_cores()), worker),
-            silence_logs=logging.CRITICAL,
-        )
+    method = {"distributed.worker.multiprocessing-method": start_fork_server()}
+    with dask.config.set(settings(patience) | method):
+        with signals_blocked():
+            cluster = SpecCluster(
+                scheduler={"cls": _calm_scheduler(patience), "options": listening},
+                workers=dict.fromkeys(range(workers or usable_cores()), worker),
+                silence_logs=logging.CRITICAL,
+            )
         try:
             with Client(cluster) as client:
                 _prepare(client)
@@ -172,26 +174,14 @@ def _calm_scheduler(patience: float) -> type[Scheduler]:
     return CalmScheduler
 
 
-def _starting() -> dict[str, Any]:
-    """Return how worker processes come to be: forked where a server for that is running."""
-    if not is_running():
-        return {}
-    from distributed import utils
-
-    # Otherwise Dask would import in the driver all that it would have a server of its own import.
-    if hasattr(utils, "_forkserver_preload_set"):
-        utils._forkserver_preload_set = True
-    return {"distributed.worker.multiprocessing-method": METHOD}
-
-
 def _prepare(client: Client) -> None:
-    from chimera_hpc.run.worker import Manners
+    from chimera_hpc.run.worker import SignalPlugin
 
     # What goes wrong is said by the run, on one line.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client.register_plugin(Manners())
+        client.register_plugin(SignalPlugin())
     except Exception as error:
         # Workers that somebody else has started: they may lack anything.
         text = " ".join(f"{type(error).__name__}: {error}".split())

@@ -15,7 +15,7 @@ from chimera_hpc.store.ledger import NO_LIMIT
 
 
 @dataclass(frozen=True)
-class Again:
+class RetryPolicy:
     """Which failed points are run once more, beside the points that never ran."""
 
     attempts: int = 0
@@ -32,7 +32,7 @@ class Again:
     max_steps: int | None = None
     """Steps a point in place of `integrator.max_steps`."""
 
-    def of_run(self, run: int) -> Again:
+    def of_run(self, run: int) -> RetryPolicy:
         """Return the same for a run that has got its number."""
         return replace(self, before=run) if self.earlier_only else self
 
@@ -46,14 +46,14 @@ class Again:
 
 
 @dataclass(frozen=True)
-class Orders:
+class RunMessage:
     """What a run tells whoever works for it."""
 
     store: Path
     run: int
-    again: Again = Again()
+    retry: RetryPolicy = RetryPolicy()
     driver: str = ""
-    """Mark of the process that gives the orders, see `processes.process_mark`."""
+    """Identity of the process that sends the message, see `processes.process_identity`."""
 
     @property
     def stop_file(self) -> Path:
@@ -62,7 +62,7 @@ class Orders:
 
 
 @dataclass(frozen=True)
-class Trouble:
+class BlockError:
     """Why a block could not be done, though none of its points is to blame as far as we know."""
 
     text: str
@@ -87,12 +87,12 @@ class BlockReceipt:
     """The run was told to stop before the block was whole."""
     late: bool = False
     """It was not begun, or not ended: too little is left of the batch job's time."""
-    trouble: Trouble | None = None
+    error: BlockError | None = None
     machine: str = ""
     """Where it was computed."""
 
 
-def tell_to_stop(orders: Orders) -> None:
+def tell_to_stop(message: RunMessage) -> None:
     """Tell all workers of a run to stop in good order; on a full disk they find out themselves."""
     with suppress(OSError):
-        orders.stop_file.touch()
+        message.stop_file.touch()

@@ -22,7 +22,7 @@ from chimera_hpc.base.files import HOPELESS
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points
 from chimera_hpc.run.block import run_block
-from chimera_hpc.run.messages import BlockReceipt, Orders, Trouble, tell_to_stop
+from chimera_hpc.run.messages import BlockError, BlockReceipt, RunMessage, tell_to_stop
 from chimera_hpc.run.slurm import walltime
 from chimera_hpc.store.block_result import BlockResult, failed_block
 from chimera_hpc.store.claims import Claim, ClaimLost, LostAttempt, claim_block, forget_points
@@ -58,34 +58,34 @@ class StopSignal:
 
 
 def do_block(
-    orders: Orders, block: int, local_stop: Callable[[], bool] | None = None
+    message: RunMessage, block: int, local_stop: Callable[[], bool] | None = None
 ) -> BlockReceipt:
     """Claim a block, compute what is to do in it, write it.
 
     Parameters
     ----------
-    orders : Orders
+    message : RunMessage
     block : int
     local_stop : callable, optional
         A second reason to stop, beside the run's stop file.
     """
-    stop = StopSignal(orders.stop_file, local_stop)
+    stop = StopSignal(message.stop_file, local_stop)
     if stop():
         # It waited in a worker's queue: nothing is begun that would only be broken off.
         return BlockReceipt(block, stopped=True)
     try:
-        return _Block(orders, block, stop).do()
+        return _Block(message, block, stop).do()
     except ClaimLost:
         return BlockReceipt(block, taken=True)
-    except OSError as error:
-        where = f" ({error.filename})" if error.filename else ""
-        trouble = _trouble(f"{error.strerror or error}{where}", error.errno)
-        if error.errno in HOPELESS:
+    except OSError as failure:
+        where = f" ({failure.filename})" if failure.filename else ""
+        error = _block_error(f"{failure.strerror or failure}{where}", failure.errno)
+        if failure.errno in HOPELESS:
             # Before a worker computes the next block in its queue for nothing.
-            tell_to_stop(orders)
-    except Exception as error:
-        trouble = _trouble(_in_a_line(error))
-    return BlockReceipt(block, trouble=trouble, machine=_machine())
+            tell_to_stop(message)
+    except Exception as failure:
+        error = _block_error(_in_a_line(failure))
+    return BlockReceipt(block, error=error, machine=_machine())
 
 
 def hand_back_all() -> None:
@@ -113,12 +113,12 @@ _in_hand: list[Claim] = []
 class _Block:
     """A block in work: what is left of it, and what has come of it so far."""
 
-    def __init__(self, orders: Orders, block: int, stop: StopSignal) -> None:
-        self.orders, self.block, self.stop = orders, block, stop
-        self.store = open_cached(orders.store)
-        self.sweep = orders.again.applied(self.store.sweep)
+    def __init__(self, message: RunMessage, block: int, stop: StopSignal) -> None:
+        self.message, self.block, self.stop = message, block, stop
+        self.store = open_cached(message.store)
+        self.sweep = message.retry.applied(self.store.sweep)
         self.n_done = self.n_failed = 0
-        self.trouble: Trouble | None = None
+        self.error: BlockError | None = None
 
     def do(self) -> BlockReceipt:
         began = time.perf_counter()
@@ -138,22 +138,22 @@ class _Block:
             time.perf_counter() - began,
             stopped=not whole,
             late=not whole and walltime.time_to_leave(),
-            trouble=self.trouble,
+            error=self.error,
             machine=_machine(),
         )
 
     def _rows_to_do(self) -> Rows:
         """Return which points of the store are to be done, as far as one sees without a claim."""
-        again = self.orders.again
-        rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
+        retry = self.message.retry
+        rows = self.store.points_to_do(self.block, retry.attempts, retry.statuses, retry.before)
         return self.store.block(self.block)[0] + rows
 
     @contextmanager
     def _claimed(self, name: int | str) -> Iterator[Claim]:
         """Hold a claim; it is handed back when the work on it is broken off."""
-        note = {"driver": self.orders.driver}
+        note = {"driver": self.message.driver}
         patience = self.sweep.run.patience
-        claim = claim_block(self.store.path, name, self.orders.run, expiry=patience, note=note)
+        claim = claim_block(self.store.path, name, self.message.run, expiry=patience, note=note)
         if claim is None:
             raise ClaimLost(f"{name} is in other hands")
         _in_hand.append(claim)
@@ -168,8 +168,8 @@ class _Block:
 
     def _work(self, claim: Claim) -> bool:
         """Do what is to do; return whether all of it was reached."""
-        again = self.orders.again
-        rows = self.store.points_to_do(self.block, again.attempts, again.statuses, again.before)
+        retry = self.message.retry
+        rows = self.store.points_to_do(self.block, retry.attempts, retry.statuses, retry.before)
         together, alone = _tries_together(self._deaths(claim))
         groups = _pieces(rows, 1 if alone else max(1, len(rows)))
         while groups:
@@ -187,7 +187,7 @@ class _Block:
         return True
 
     def _write(self, claim: Claim, result: BlockResult, tries: int, rows: Rows) -> None:
-        receipt = self.store.write_block(self.block, result, self.orders.run, tries, claim, rows)
+        receipt = self.store.write_block(self.block, result, self.message.run, tries, claim, rows)
         self.n_done += receipt.n_done
         self.n_failed += receipt.n_failed
 
@@ -211,7 +211,7 @@ class _Block:
             if len(rows) > 1:
                 return None
             where = " ".join(f"{name}={points.row(0)[name]}" for name in points.axes)
-            self.trouble = self.trouble or _trouble(f"point {where}: {_in_a_line(error)}")
+            self.error = self.error or _block_error(f"point {where}: {_in_a_line(error)}")
             return failed_block(self.sweep, points, Status.NEVER)
 
     def _compute_alone(
@@ -248,7 +248,7 @@ class _Block:
     def _died_by_itself(self, lost: LostAttempt) -> bool:
         process, note = lost.info.get("process"), lost.info.get("note")
         was_driver = isinstance(note, dict) and note.get("driver") == process
-        return was_driver or lost.info.get("run") == self.orders.run
+        return was_driver or lost.info.get("run") == self.message.run
 
 
 def _tries_together(deaths: Sequence[LostAttempt]) -> tuple[int, bool]:
@@ -284,8 +284,8 @@ def _pieces(rows: Rows, size: int) -> list[Rows]:
     return [rows[i : i + size] for i in range(0, len(rows), size)]
 
 
-def _trouble(text: str, errno: int | None = None) -> Trouble:
-    return Trouble(text, traceback.format_exc(), errno)
+def _block_error(text: str, errno: int | None = None) -> BlockError:
+    return BlockError(text, traceback.format_exc(), errno)
 
 
 def _in_a_line(error: Exception) -> str:

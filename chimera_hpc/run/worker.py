@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from distributed import WorkerPlugin
 
+from chimera_hpc.run.fork_server import BLOCKED
 from chimera_hpc.run.slurm.walltime import WORKER, leaving, time_to_leave
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ _NEARLY = 0.9
 worker at 0.95 of it."""
 
 
-class Manners(WorkerPlugin):
+class SignalPlugin(WorkerPlugin):
     """How a worker process takes signals."""
 
     name = "chimera_hpc"
@@ -55,6 +56,7 @@ class Manners(WorkerPlugin):
         if WORKER in os.environ:
             _leave_in_time(worker)
         _on(signal.SIGTERM, end)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, BLOCKED)
 
     def teardown(self, worker: Worker) -> None:
         """Spare the end of the process the look through everything for garbage."""

@@ -33,7 +33,7 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc.base.files import create_exclusively, server_time
-from chimera_hpc.base.processes import is_gone, process_mark
+from chimera_hpc.base.processes import is_gone, process_identity
 
 FOLDER = "claims"
 EXPIRY = 60.0
@@ -215,7 +215,7 @@ def _content(
         "attempt": attempt,
         "host": socket.gethostname(),
         "pid": os.getpid(),
-        "process": process_mark(),
+        "process": process_identity(),
         "since": time.time(),
         "expiry": expiry,
         "token": token,

@@ -13,7 +13,7 @@ from projection import Costs
 from chimera_hpc.job import Sweep
 from chimera_hpc.run.block import run_block, warm_up
 from chimera_hpc.run.executors import run_dask
-from chimera_hpc.run.messages import Orders
+from chimera_hpc.run.messages import RunMessage
 from chimera_hpc.store.ledger import read_ledger
 from chimera_hpc.store.store import Store
 
@@ -51,6 +51,8 @@ def _dask_costs(scale: ModuleType, folder: Path, path: Path) -> tuple[float, flo
         process = psutil.Process(scheduler.pid)
         before = sum(process.cpu_times()[:2])
         blocks = range(store.n_blocks)
-        run_dask(client, Orders(path, 1), blocks, lambda r: spent.append(r.seconds), lambda: False)
+        run_dask(
+            client, RunMessage(path, 1), blocks, lambda r: spent.append(r.seconds), lambda: False
+        )
         after = sum(process.cpu_times()[:2])
     return sum(spent) / len(spent), (after - before) / len(spent)

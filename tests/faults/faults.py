@@ -422,9 +422,9 @@ def _metadata(store: Path) -> dict[str, Any]:
 
 def _mark_of_the_dead() -> str:
     """Return the mark of a process of this machine that is gone."""
-    from chimera_hpc.base.processes import process_mark
+    from chimera_hpc.base.processes import process_identity
 
-    machine, _, rest = process_mark().partition("-")
+    machine, _, rest = process_identity().partition("-")
     return f"{machine}-{os.getpid()}-{int(rest.partition('-')[2]) + 1}"
 
 

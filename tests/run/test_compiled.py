@@ -33,6 +33,8 @@ def made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         (folder / "there" / f"kernel-{len(found)}.nbc").write_bytes(b"")
 
     monkeypatch.setattr(task, "warm_up", compile_)
+    # No second process.
+    monkeypatch.setattr(compiled, "usable_cores", lambda: 1)
     return found
 
 

@@ -12,7 +12,7 @@ from distributed.scheduler import KilledWorker
 
 from chimera_hpc.run import executors as execute
 from chimera_hpc.run.executors import ClusterLost, run_dask, run_serial
-from chimera_hpc.run.messages import BlockReceipt, Orders
+from chimera_hpc.run.messages import BlockReceipt, RunMessage
 
 Outcome = BlockReceipt | BaseException | None
 """Of a block: its receipt, an error, or None when it never ends."""
@@ -58,7 +58,7 @@ class Client:
     def scheduler_info(self, n_workers: int) -> dict[str, Any]:
         return {"workers": dict.fromkeys(range(self.workers))}
 
-    def submit(self, do: object, orders: Orders, block: int, key: str, pure: bool) -> Future:
+    def submit(self, do: object, message: RunMessage, block: int, key: str, pure: bool) -> Future:
         assert key not in self.keys
         self.keys.add(key)
         self.submitted.append(block)
@@ -67,37 +67,37 @@ class Client:
 
 
 @pytest.fixture
-def orders(tmp_path: Path) -> Orders:
+def message(tmp_path: Path) -> RunMessage:
     (tmp_path / "runs").mkdir()
-    return Orders(tmp_path, 1)
+    return RunMessage(tmp_path, 1)
 
 
-def go(client: Client, orders: Orders, blocks: range, **options: Any) -> list[BlockReceipt]:
+def go(client: Client, message: RunMessage, blocks: range, **options: Any) -> list[BlockReceipt]:
     receipts: list[BlockReceipt] = []
     stop = options.pop("stop", lambda: False)
-    run_dask(client, orders, blocks, receipts.append, stop, **options)  # type: ignore[arg-type]
+    run_dask(client, message, blocks, receipts.append, stop, **options)  # type: ignore[arg-type]
     return receipts
 
 
-def test_every_block_is_submitted_once(orders: Orders) -> None:
+def test_every_block_is_submitted_once(message: RunMessage) -> None:
     client = Client(2)
-    receipts = go(client, orders, range(50))
+    receipts = go(client, message, range(50))
     assert sorted(receipt.block for receipt in receipts) == list(range(50))
     assert sorted(client.submitted) == list(range(50))
 
 
-def test_window_is_bounded(orders: Orders, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_window_is_bounded(message: RunMessage, monkeypatch: pytest.MonkeyPatch) -> None:
     client = Client(2, {block: [None] for block in range(100)})
     asked = iter([False, False, True])
     monkeypatch.setattr(execute, "_LOOK_SECONDS", 0.01)
-    go(client, orders, range(100), stop=lambda: next(asked, True), patience=0.05)
+    go(client, message, range(100), stop=lambda: next(asked, True), patience=0.05)
     assert client.submitted == list(range(6))
 
 
-def test_killed_worker_means_that_the_block_is_submitted_again(orders: Orders) -> None:
+def test_killed_worker_means_that_the_block_is_submitted_again(message: RunMessage) -> None:
     lost = KilledWorker("task", None, 3)
     client = Client(1, {1: [lost, lost, BlockReceipt(1, 4)]})
-    receipts = go(client, orders, range(3))
+    receipts = go(client, message, range(3))
     assert sorted(receipt.block for receipt in receipts) == [0, 1, 2]
     assert client.submitted.count(1) == 3
 
@@ -106,24 +106,24 @@ def test_killed_worker_means_that_the_block_is_submitted_again(orders: Orders) -
     "outcome",
     [Future(None, cancelled=True), Future(BlockReceipt(0), way=OSError("connection closed"))],
 )
-def test_lost_scheduler_is_told(outcome: Any, orders: Orders) -> None:
+def test_lost_scheduler_is_told(outcome: Any, message: RunMessage) -> None:
     with pytest.raises(ClusterLost, match="the scheduler is gone"):
-        go(Client(1, {0: [outcome]}), orders, range(3))
+        go(Client(1, {0: [outcome]}), message, range(3))
 
 
 def test_cluster_without_workers_is_given_up(
-    orders: Orders, monkeypatch: pytest.MonkeyPatch
+    message: RunMessage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(execute, "NO_WORKER_SECONDS", 0.05)
     monkeypatch.setattr(execute, "_LOOK_SECONDS", 0.02)
     monkeypatch.setattr(execute, "_COUNT_SECONDS", 0.02)
     client = Client(0, {0: [None]})
     with pytest.raises(ClusterLost, match="no worker for"):
-        go(client, orders, range(1))
+        go(client, message, range(1))
     asked = iter([False] * 20)
     go(
         Client(0, {0: [None]}),
-        orders,
+        message,
         range(1),
         stop=lambda: next(asked, True),
         patience=0.1,
@@ -131,26 +131,26 @@ def test_cluster_without_workers_is_given_up(
     )
 
 
-def test_error_on_the_way_is_the_trouble_of_its_block(orders: Orders) -> None:
-    receipts = go(Client(1, {1: [ModuleNotFoundError("no module x")]}), orders, range(3))
-    trouble = {receipt.block: receipt.trouble for receipt in receipts}
-    assert trouble[0] is None
-    assert trouble[1] is not None
-    assert trouble[1].text == "ModuleNotFoundError: no module x"
+def test_error_on_the_way_is_the_trouble_of_its_block(message: RunMessage) -> None:
+    receipts = go(Client(1, {1: [ModuleNotFoundError("no module x")]}), message, range(3))
+    error = {receipt.block: receipt.error for receipt in receipts}
+    assert error[0] is None
+    assert error[1] is not None
+    assert error[1].text == "ModuleNotFoundError: no module x"
 
 
-def test_stop_reaches_the_workers_and_what_they_have_is_waited_for(orders: Orders) -> None:
+def test_stop_reaches_the_workers_and_what_they_have_is_waited_for(message: RunMessage) -> None:
     client = Client(1, {0: [BlockReceipt(0, 2, stopped=True)]})
-    receipts = go(client, orders, range(30), stop=lambda: True)
-    assert orders.stop_file.exists()
+    receipts = go(client, message, range(30), stop=lambda: True)
+    assert message.stop_file.exists()
     assert len(receipts) == 3
     assert client.submitted == [0, 1, 2]
 
 
 def test_serial_executor_stops_between_blocks(
-    orders: Orders, monkeypatch: pytest.MonkeyPatch
+    message: RunMessage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(execute, "do_block", lambda orders, block, stop: BlockReceipt(block))
+    monkeypatch.setattr(execute, "do_block", lambda message, block, stop: BlockReceipt(block))
     receipts: list[BlockReceipt] = []
-    run_serial(orders, range(10), receipts.append, lambda: len(receipts) == 4)
+    run_serial(message, range(10), receipts.append, lambda: len(receipts) == 4)
     assert [receipt.block for receipt in receipts] == [0, 1, 2, 3]

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from store_tools import small_sweep
 
-from chimera_hpc.base.processes import process_mark
+from chimera_hpc.base.processes import process_identity
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.run import work
-from chimera_hpc.run.messages import Again, Orders
+from chimera_hpc.run.messages import RetryPolicy, RunMessage
 from chimera_hpc.run.work import do_block
 from chimera_hpc.store.block_result import BlockResult, failed_block
 from chimera_hpc.store.claims import Claim, claim_block
@@ -57,8 +57,8 @@ def compute(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., BlockRes
     return replace
 
 
-def orders(store: Store, **options: Any) -> Orders:
-    return Orders(store.path, options.pop("run", RUN), **options)
+def message(store: Store, **options: Any) -> RunMessage:
+    return RunMessage(store.path, options.pop("run", RUN), **options)
 
 
 def status_of(store: Store) -> list[int]:
@@ -67,7 +67,7 @@ def status_of(store: Store) -> list[int]:
 
 def gone(claim: Claim, driver: str = "somebody") -> None:
     """Have the claim look as if its process had died in run 1, the driver living on."""
-    machine, pid, start = process_mark().split("-")
+    machine, pid, start = process_identity().split("-")
     info = json.loads(claim.path.read_bytes())
     dead = f"{machine}-{pid}-{int(start) + 1}"
     claim.path.write_text(json.dumps({**info, "process": dead, "note": {"driver": driver or dead}}))
@@ -89,8 +89,8 @@ def is_bad(points: Points, seed: int = 2) -> bool:
 
 def test_block_is_computed_written_and_released(store: Store, compute: Any) -> None:
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    receipt = do_block(orders(store), 0)
-    assert (receipt.n_done, receipt.n_failed, receipt.trouble) == (4, 0, None)
+    receipt = do_block(message(store), 0)
+    assert (receipt.n_done, receipt.n_failed, receipt.error) == (4, 0, None)
     assert not receipt.stopped
     assert not receipt.taken
     assert sizes == [4]
@@ -100,8 +100,8 @@ def test_block_is_computed_written_and_released(store: Store, compute: Any) -> N
 
 def test_block_that_is_whole_is_not_computed_again(store: Store, compute: Any) -> None:
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    do_block(orders(store), 0)
-    assert do_block(orders(store, run=2), 0).n_done == 0
+    do_block(message(store), 0)
+    assert do_block(message(store, run=2), 0).n_done == 0
     assert sizes == [4]
     assert store.ledger()["run"][:4].tolist() == [1, 1, 1, 1]
 
@@ -109,7 +109,7 @@ def test_block_that_is_whole_is_not_computed_again(store: Store, compute: Any) -
 def test_block_in_other_hands_is_left_alone(store: Store, compute: Any) -> None:
     sizes = compute(lambda sweep, points, _: done(sweep, points))
     claim_block(store.path, 0, 7)
-    assert do_block(orders(store), 0).taken
+    assert do_block(message(store), 0).taken
     assert sizes == []
 
 
@@ -122,7 +122,7 @@ def test_memory_error_splits_the_block_down_to_the_point_that_fails_alone(
         return done(sweep, points)
 
     sizes = compute(run)
-    receipt = do_block(orders(store), 0)
+    receipt = do_block(message(store), 0)
     assert (receipt.n_done, receipt.n_failed) == (3, 1)
     assert status_of(store) == [1, 1, Status.OUT_OF_MEMORY, 1]
     assert sizes == [4, 2, 2, 1, 1]
@@ -135,7 +135,7 @@ def test_block_that_is_too_large_together_has_no_failed_point(store: Store, comp
         return done(sweep, points)
 
     compute(run)
-    assert do_block(orders(store), 0).n_done == 4
+    assert do_block(message(store), 0).n_done == 4
     assert status_of(store) == [1, 1, 1, 1]
 
 
@@ -148,13 +148,13 @@ def test_error_in_a_model_is_named_and_the_other_points_are_done(
         return done(sweep, points)
 
     compute(run)
-    receipt = do_block(orders(store), 0)
-    assert receipt.trouble is not None
-    assert receipt.trouble.text == "point P=2 Q=2 seed=2: ZeroDivisionError: division by zero"
-    assert "Traceback" in receipt.trouble.trace
+    receipt = do_block(message(store), 0)
+    assert receipt.error is not None
+    assert receipt.error.text == "point P=2 Q=2 seed=2: ZeroDivisionError: division by zero"
+    assert "Traceback" in receipt.error.trace
     assert status_of(store) == [1, 1, Status.NEVER, 1]
     compute(lambda sweep, points, _: done(sweep, points))
-    assert do_block(orders(store), 0).n_done == 1
+    assert do_block(message(store), 0).n_done == 1
 
 
 def test_error_of_the_system_is_told_and_the_block_handed_back(
@@ -166,17 +166,17 @@ def test_error_of_the_system_is_told_and_the_block_handed_back(
         raise OSError(errno.ENOSPC, "No space left on device", "u/c.0")
 
     monkeypatch.setattr(Store, "write_block", full)
-    orders(store).stop_file.parent.mkdir(exist_ok=True)
-    receipt = do_block(orders(store), 0)
-    assert receipt.trouble is not None
-    assert receipt.trouble.errno == errno.ENOSPC
-    assert receipt.trouble.text == "No space left on device (u/c.0)"
+    message(store).stop_file.parent.mkdir(exist_ok=True)
+    receipt = do_block(message(store), 0)
+    assert receipt.error is not None
+    assert receipt.error.errno == errno.ENOSPC
+    assert receipt.error.text == "No space left on device (u/c.0)"
     # No worker of this run begins another block.
-    assert do_block(orders(store), 1).stopped
-    orders(store).stop_file.unlink()
+    assert do_block(message(store), 1).stopped
+    message(store).stop_file.unlink()
     monkeypatch.undo()
     compute(lambda sweep, points, _: done(sweep, points))
-    assert do_block(orders(store), 0).n_done == 4
+    assert do_block(message(store), 0).n_done == 4
     # The first try came to nothing, but its claim was handed back: nobody died.
     assert store.ledger()["attempts"][:4].tolist() == [1, 1, 1, 1]
 
@@ -184,9 +184,9 @@ def test_error_of_the_system_is_told_and_the_block_handed_back(
 def test_nothing_is_begun_once_the_run_is_told_to_stop(store: Store, compute: Any) -> None:
     sizes = compute(lambda sweep, points, _: done(sweep, points))
     (store.path / "runs").mkdir()
-    orders(store).stop_file.touch()
-    assert do_block(orders(store), 0).stopped
-    assert do_block(orders(store), 0, lambda: True).stopped
+    message(store).stop_file.touch()
+    assert do_block(message(store), 0).stopped
+    assert do_block(message(store), 0, lambda: True).stopped
     assert sizes == []
     assert not (store.path / "claims").exists()
 
@@ -203,12 +203,12 @@ def test_stopped_block_keeps_what_it_has_and_is_free_at_once(store: Store, compu
         return result
 
     compute(run)
-    receipt = do_block(orders(store), 0, lambda: asked)
+    receipt = do_block(message(store), 0, lambda: asked)
     assert receipt.stopped
     assert receipt.n_done == 2
     assert status_of(store) == [1, 1, Status.NEVER, Status.NEVER]
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    assert do_block(orders(store, run=2), 0).n_done == 2
+    assert do_block(message(store, run=2), 0).n_done == 2
     assert sizes == [2]
     ledger = store.ledger()
     assert ledger["run"][:4].tolist() == [1, 1, 2, 2]
@@ -223,14 +223,14 @@ def test_owner_that_lost_its_claim_writes_nothing(store: Store, compute: Any) ->
         return done(sweep, points)
 
     compute(run)
-    assert do_block(orders(store), 0).taken
+    assert do_block(message(store), 0).taken
     assert status_of(store) == [Status.NEVER] * 4
 
 
 def test_one_death_is_no_reason_to_split(store: Store, compute: Any) -> None:
     die(store)
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    do_block(orders(store), 0)
+    do_block(message(store), 0)
     assert sizes == [4]
     assert store.ledger()["attempts"][:4].tolist() == [2, 2, 2, 2]
 
@@ -239,7 +239,7 @@ def test_point_that_kills_its_workers_is_found_and_put_aside(store: Store, compu
     die(store, times=2)
     die(store, "0_2", times=2)
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    receipt = do_block(orders(store), 0)
+    receipt = do_block(message(store), 0)
     assert (receipt.n_done, receipt.n_failed) == (3, 1)
     assert sizes == [1, 1, 1]
     assert status_of(store) == [1, 1, Status.WORKER_LOST, 1]
@@ -251,7 +251,7 @@ def test_point_that_died_of_memory_is_out_of_memory(store: Store, compute: Any) 
     die(store, memory=True)
     die(store, "0_2", times=2, memory=True)
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    do_block(orders(store), 0)
+    do_block(message(store), 0)
     assert sizes == [1, 1, 1]
     assert status_of(store) == [1, 1, Status.OUT_OF_MEMORY, 1]
     assert store.ledger()["attempts"][:4].tolist() == [2, 2, 3, 2]
@@ -263,7 +263,7 @@ def test_workers_that_died_with_their_driver_say_nothing_of_the_points(
     die(store, times=5)
     die(store, "0_2", times=5)
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    do_block(orders(store, run=2), 0)
+    do_block(message(store, run=2), 0)
     assert sizes == [4]
     assert store.ledger()["attempts"][:4].tolist() == [1, 1, 1, 1]
     assert os.listdir(store.path / "claims") == []
@@ -272,16 +272,16 @@ def test_workers_that_died_with_their_driver_say_nothing_of_the_points(
 def test_drivers_that_died_of_their_own_work_count(store: Store, compute: Any) -> None:
     die(store, times=2, driver="")
     sizes = compute(lambda sweep, points, _: done(sweep, points))
-    do_block(orders(store, run=2), 0)
+    do_block(message(store, run=2), 0)
     assert sizes == [1, 1, 1, 1]
 
 
 def test_failed_points_are_tried_again_as_often_as_asked(store: Store, compute: Any) -> None:
     compute(lambda sweep, points, _: failed_block(sweep, points, Status.TIME_OUT))
-    do_block(orders(store), 0)
+    do_block(message(store), 0)
     sizes = compute(lambda sweep, points, _: failed_block(sweep, points, Status.TIME_OUT))
     for _ in range(3):
-        do_block(orders(store, again=Again(attempts=3)), 0)
+        do_block(message(store, retry=RetryPolicy(attempts=3)), 0)
     assert sizes == [4, 4]
     assert store.ledger()["attempts"][:4].tolist() == [3, 3, 3, 3]
 
@@ -296,17 +296,19 @@ def test_retry_takes_only_failures_of_earlier_runs_and_its_own_limits(
         return failed_block(sweep, points, Status.STEP_BUDGET)
 
     compute(run)
-    do_block(orders(store), 0)
-    again = Again(10, (Status.STEP_BUDGET,), earlier_only=True, time_out=7.0, max_steps=8).of_run(2)
+    do_block(message(store), 0)
+    retry = RetryPolicy(
+        10, (Status.STEP_BUDGET,), earlier_only=True, time_out=7.0, max_steps=8
+    ).of_run(2)
     for _ in range(2):
-        do_block(orders(store, run=2, again=again), 0)
+        do_block(message(store, run=2, retry=retry), 0)
     assert limits == [(600.0, 10_000_000), (7.0, 8)]
 
 
 def test_results_do_not_depend_on_how_the_block_was_split(store: Store, compute: Any) -> None:
     die(store, times=2)
     compute(lambda sweep, points, _: done(sweep, points))
-    do_block(orders(store), 0)
-    do_block(orders(store), 1)
+    do_block(message(store), 0)
+    do_block(message(store), 1)
     features = store.features()[:8, 0, 0]
     assert np.array_equal(features, store.points.columns["seed"][:8])

@@ -168,14 +168,14 @@ def serial_rate(folder: Path) -> float:
     sys.path.insert(0, str(FOLDER))
     import nothing  # noqa: F401
 
-    from chimera_hpc.run.messages import Orders
+    from chimera_hpc.run.messages import RunMessage
     from chimera_hpc.run.work import do_block
     from chimera_hpc.store.store import Store
 
     path = plan(folder, "serial", SMALL).path
-    orders, n_blocks = Orders(path, 1), Store.open(path).n_blocks
+    message, n_blocks = RunMessage(path, 1), Store.open(path).n_blocks
     began = time.perf_counter()
-    receipts = [do_block(orders, block) for block in range(n_blocks)]
+    receipts = [do_block(message, block) for block in range(n_blocks)]
     seconds = time.perf_counter() - began
     assert sum(receipt.n_done for receipt in receipts) == SMALL
     shutil.rmtree(path)
@@ -187,7 +187,7 @@ def scheduler_memory(folder: Path, path: Path) -> int:
     from distributed import Client
 
     from chimera_hpc.run.executors import run_dask
-    from chimera_hpc.run.messages import Orders
+    from chimera_hpc.run.messages import RunMessage
     from chimera_hpc.store.store import Store
 
     store = Store.open(path)
@@ -195,7 +195,7 @@ def scheduler_memory(folder: Path, path: Path) -> int:
     with _dask(folder) as (scheduler, address), Client(address) as client:
         blocks = range(store.n_blocks)
         never: Callable[[], bool] = lambda: False  # noqa: E731
-        run_dask(client, Orders(path, 1), blocks, lambda r: done.append(r.n_done), never)
+        run_dask(client, RunMessage(path, 1), blocks, lambda r: done.append(r.n_done), never)
         memory: int = psutil.Process(scheduler.pid).memory_info().rss
     assert sum(done) == store.n_points
     return memory

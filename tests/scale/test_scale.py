@@ -14,7 +14,7 @@ from programs import SCALE, load_program
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.run import work
-from chimera_hpc.run.messages import Orders
+from chimera_hpc.run.messages import RunMessage
 from chimera_hpc.run.work import do_block
 from chimera_hpc.store.block_result import BlockResult, failed_block
 from chimera_hpc.store.ledger import FIELDS, chunk_name, seal
@@ -74,7 +74,7 @@ def test_files_are_at_most_four_a_block_and_few_beside(
     store = Store.plan(tmp_path / "store.zarr", Sweep.load(job))
     empty = count_files(store.path)
     for block in range(store.n_blocks):
-        do_block(Orders(store.path, 1), block)
+        do_block(RunMessage(store.path, 1), block)
     assert store.n_blocks == 30
     assert empty < 100
     assert count_files(store.path) - empty == 4 * store.n_blocks

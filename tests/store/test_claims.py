@@ -15,7 +15,7 @@ import pytest
 from store_tools import claim_and_tell, process_context
 
 from chimera_hpc.base import files, processes
-from chimera_hpc.base.processes import is_gone, process_mark
+from chimera_hpc.base.processes import is_gone, process_identity
 from chimera_hpc.store import claims
 from chimera_hpc.store.claims import (
     Claim,
@@ -63,7 +63,7 @@ def test_claim_file_says_who_works_there(tmp_path: Path) -> None:
     assert (info["run"], info["pid"], info["attempt"]) == (7, os.getpid(), 1)
     assert info["note"] == {"first": 12}
     assert live_claims(tmp_path).keys() == {3}
-    assert live_claims(tmp_path)[3]["process"] == process_mark()
+    assert live_claims(tmp_path)[3]["process"] == process_identity()
 
 
 def test_expired_claim_is_taken_over_with_the_attempt_counted(tmp_path: Path) -> None:
@@ -293,7 +293,7 @@ def test_without_hard_links_files_are_opened_exclusively(tmp_path: Path, monkeyp
 
 
 def test_only_processes_of_this_machine_are_declared_gone() -> None:
-    machine, pid, start = process_mark().split("-")
+    machine, pid, start = process_identity().split("-")
     assert not is_gone(f"{machine}-{pid}-{start}")
     assert is_gone(f"{machine}-{pid}-{int(start) + 1}"), "the number was given to another process"
     assert is_gone(f"{machine}-4194303-{start}")
@@ -303,11 +303,11 @@ def test_only_processes_of_this_machine_are_declared_gone() -> None:
 
 
 def test_a_forked_process_has_a_mark_of_its_own() -> None:
-    ours = process_mark()
+    ours = process_identity()
     reader, writer = os.pipe()
     child = os.fork()
     if not child:
-        os.write(writer, process_mark().encode())
+        os.write(writer, process_identity().encode())
         os._exit(0)
     os.waitpid(child, 0)
     machine = ours.partition("-")[0]
@@ -323,7 +323,7 @@ def test_without_proc_only_the_number_counts(tmp_path: Path, monkeypatch: Any) -
     monkeypatch.setattr(processes, "_PROC", tmp_path)
     for known in (processes._machine, processes._mark):
         known.cache_clear()
-    mark = process_mark()
+    mark = process_identity()
     assert mark.endswith(f"-{os.getpid()}-0")
     assert not is_gone(mark)
     assert is_gone(mark.replace(f"-{os.getpid()}-", "-4194303-"))

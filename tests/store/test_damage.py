@@ -198,9 +198,9 @@ def test_only_left_over_temporary_files_are_removed(store: Store) -> None:
 
 
 def _mark(pid: int) -> str:
-    from chimera_hpc.base.processes import process_mark
+    from chimera_hpc.base.processes import process_identity
 
-    machine, _, start = process_mark().split("-")
+    machine, _, start = process_identity().split("-")
     return f"{machine}-{pid}-{start}"
 
 

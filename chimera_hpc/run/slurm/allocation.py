@@ -27,7 +27,7 @@ _END_SECONDS = 5.0
 
 @contextmanager
 def allocation_cluster(
-    wishes: Slurm, store: Path, say: Say, patience: float = 60.0
+    slurm_options: Slurm, store: Path, say: Say, patience: float = 60.0
 ) -> Iterator[Client]:
     """Start a scheduler here and a worker for each task of this job; give a client of it.
 
@@ -38,7 +38,7 @@ def allocation_cluster(
     """
     if "SLURM_JOB_ID" not in os.environ:
         raise BadInput("--cluster allocation: works inside a SLURM job only; see the command slurm")
-    check_interface(wishes)
+    check_interface(slurm_options)
     import dask
     from distributed import Client, LocalCluster
     from distributed.utils import get_ip
@@ -46,7 +46,9 @@ def allocation_cluster(
     job = os.environ["SLURM_JOB_ID"]
     logs = store.parent / LOGS
     logs.mkdir(exist_ok=True)
-    where = {"interface": wishes.interface} if wishes.interface else {"host": get_ip()}
+    where = (
+        {"interface": slurm_options.interface} if slurm_options.interface else {"host": get_ip()}
+    )
     restarts = os.environ.get("SLURM_RESTART_COUNT", "0")
     with (
         dask.config.set(settings(patience)),
@@ -61,20 +63,20 @@ def allocation_cluster(
         ) as cluster,
         Client(cluster) as client,
     ):
-        from chimera_hpc.run.worker import Manners
+        from chimera_hpc.run.worker import SignalPlugin
 
-        client.register_plugin(Manners())
+        client.register_plugin(SignalPlugin())
         say(tunnel(cluster.scheduler))
         address = [cluster.scheduler_address, *certificate.worker_arguments()]
-        with _workers(store, address, wishes, logs / f"workers-{job}.log"):
+        with _workers(store, address, slurm_options, logs / f"workers-{job}.log"):
             yield client
             client.retire_workers(close_workers=True)
 
 
 @contextmanager
-def _workers(store: Path, address: list[str], wishes: Slurm, log: Path) -> Iterator[None]:
+def _workers(store: Path, address: list[str], slurm_options: Slurm, log: Path) -> Iterator[None]:
     """Start the workers in one step, after each node has compiled the kernels once."""
-    memory = wishes.mem or MEMORY
+    memory = slurm_options.mem or MEMORY
     step = ["srun", f"--mem-per-cpu={memory}", "--kill-on-bad-exit=0", "--cpus-per-task=1"]
     nodes = os.environ.get("SLURM_JOB_NUM_NODES", "1")
     compile_once = [*step, f"--nodes={nodes}", f"--ntasks={nodes}", "--ntasks-per-node=1"]
@@ -83,7 +85,7 @@ def _workers(store: Path, address: list[str], wishes: Slurm, log: Path) -> Itera
         *(sys.executable, "-m", "distributed.cli.dask_worker", *address),
         *("--nthreads", "1", "--memory-limit", limit, "--death-timeout", "60"),
         *NO_DASHBOARD,
-        *(["--interface", wishes.interface] if wishes.interface else []),
+        *(["--interface", slurm_options.interface] if slurm_options.interface else []),
     ]
     with log.open("ab") as out:
         streams: dict[str, Any] = {"stdout": out, "stderr": out, "stdin": subprocess.DEVNULL}

@@ -24,8 +24,8 @@ def user_file() -> Path:
     return Path(base) / "chimera_hpc" / "config.toml"
 
 
-def wishes(table: Slurm, given: Mapping[str, Any]) -> Slurm:
-    """Return the wishes of the user's file, overridden by the job's and the command line's.
+def slurm_options(table: Slurm, given: Mapping[str, Any]) -> Slurm:
+    """Return what is asked of SLURM: the user's file, overridden by the job and the command line.
 
     Raises
     ------

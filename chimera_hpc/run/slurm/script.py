@@ -100,52 +100,63 @@ class Target:
         return self.command("run", *self.words(), *words)
 
 
-def array_script(target: Target, wishes: Slurm) -> str:
+def array_script(target: Target, slurm_options: Slurm) -> str:
     """Return a job array: each element does its share of the blocks, with nobody between."""
-    n = wishes.array or ARRAY
-    most = f"%{wishes.at_once}" if wishes.at_once else ""
-    options = [f"--array=0-{n - 1}{most}", "--ntasks=1", f"--mem={wishes.mem or MEMORY}"]
+    n = slurm_options.array or ARRAY
+    most = f"%{slurm_options.at_once}" if slurm_options.at_once else ""
+    options = [f"--array=0-{n - 1}{most}", "--ntasks=1", f"--mem={slurm_options.mem or MEMORY}"]
     what = [str(target.folder)] if target.planned else target.words()
     lines = [
         compile_line(target.python, target.folder if target.planned else target.job),
         target.command("shard", *what, "--of", str(n), *target.again()),
     ]
-    return _script(target, wishes, options, "\n".join(lines), "%A_%a")
+    return _script(target, slurm_options, options, "\n".join(lines), "%A_%a")
 
 
-def allocation_script(target: Target, wishes: Slurm) -> str:
+def allocation_script(target: Target, slurm_options: Slurm) -> str:
     """Return one job that holds driver, scheduler and workers."""
-    memory = wishes.mem or MEMORY
-    options = [f"--ntasks={wishes.workers or WORKERS}", f"--mem-per-cpu={memory}", "--no-kill"]
-    words = ["--cluster", "allocation", "--mem", memory, *_interface(wishes), *target.again()]
-    return _script(target, wishes, options, target.run(*words), "%j")
+    memory = slurm_options.mem or MEMORY
+    options = [
+        f"--ntasks={slurm_options.workers or WORKERS}",
+        f"--mem-per-cpu={memory}",
+        "--no-kill",
+    ]
+    words = [
+        "--cluster",
+        "allocation",
+        "--mem",
+        memory,
+        *_interface(slurm_options),
+        *target.again(),
+    ]
+    return _script(target, slurm_options, options, target.run(*words), "%j")
 
 
-def jobqueue_script(target: Target, wishes: Slurm) -> str:
+def jobqueue_script(target: Target, slurm_options: Slurm) -> str:
     """Return a small job that holds the driver, which submits a job for each worker.
 
     For sites whose login nodes are not for programs that run for long.
     """
     names = ("partition", "account", "time", "mem", "workers", "interface")
-    given = [(f"--{name}", getattr(wishes, name)) for name in names]
+    given = [(f"--{name}", getattr(slurm_options, name)) for name in names]
     words = [str(word) for option in given if option[1] is not None for word in option]
     options = ["--ntasks=1", "--mem=2G"]
     command = target.run("--cluster", "slurm", *words, *target.again())
-    return _script(target, wishes, options, command, "%j")
+    return _script(target, slurm_options, options, command, "%j")
 
 
-def reduce_script(target: Target, wishes: Slurm) -> str:
+def reduce_script(target: Target, slurm_options: Slurm) -> str:
     """Return the job that reduces a sweep after the others, if every point was tried."""
     options = ["--ntasks=1", "--mem=4G"]
     words = ["reduce", str(target.folder), "--complete"]
-    return _script(target, wishes, options, target.command(*words), "%j")
+    return _script(target, slurm_options, options, target.command(*words), "%j")
 
 
-def worker_request(store: Path, wishes: Slurm) -> str:
+def worker_request(store: Path, slurm_options: Slurm) -> str:
     """Return a script that asks for what the job of one worker asks for, to be tested only."""
     target = Target(store, store.parent, job_name(store, "test"))
-    options = ["--ntasks=1", f"--mem={wishes.mem or MEMORY}"]
-    return _script(target, wishes, options, "true", "%j")
+    options = ["--ntasks=1", f"--mem={slurm_options.mem or MEMORY}"]
+    return _script(target, slurm_options, options, "true", "%j")
 
 
 SCRIPTS = {
@@ -167,20 +178,24 @@ def templates() -> dict[str, str]:
 
 
 def _script(
-    target: Target, wishes: Slurm, options: Sequence[str], command: str, number: str
+    target: Target, slurm_options: Slurm, options: Sequence[str], command: str, number: str
 ) -> str:
     log = f"%x-{number}.log"
     header = [
         f"--job-name={target.name}",
         *options,
         "--cpus-per-task=1",
-        f"--time={wishes.time or TIME}",
+        f"--time={slurm_options.time or TIME}",
         f"--output={target.logs / log if target.logs else log}",
         # A job that is put back into the queue goes on where it was, in the same log.
         "--open-mode=append",
         "--requeue",
-        *(f"--{name}={value}" for name in ("partition", "account") if (value := _of(wishes, name))),
-        *wishes.extra,
+        *(
+            f"--{name}={value}"
+            for name in ("partition", "account")
+            if (value := _of(slurm_options, name))
+        ),
+        *slurm_options.extra,
     ]
     drain = [] if target.drain is None else [f"export {DRAIN}={target.drain:g}"]
     lines = [
@@ -188,19 +203,19 @@ def _script(
         *(f"#SBATCH {_quoted(option)}" for option in header),
         *environment_lines(),
         *drain,
-        *wishes.setup,
+        *slurm_options.setup,
         command,
     ]
     return "\n".join(lines) + "\n"
 
 
-def _of(wishes: Slurm, name: str) -> str | None:
-    value: str | None = getattr(wishes, name)
+def _of(slurm_options: Slurm, name: str) -> str | None:
+    value: str | None = getattr(slurm_options, name)
     return value
 
 
-def _interface(wishes: Slurm) -> list[str]:
-    return ["--interface", wishes.interface] if wishes.interface else []
+def _interface(slurm_options: Slurm) -> list[str]:
+    return ["--interface", slurm_options.interface] if slurm_options.interface else []
 
 
 def _quoted(option: str) -> str:

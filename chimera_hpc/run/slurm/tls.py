@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import create_exclusively
-from chimera_hpc.base.processes import is_gone, process_mark
+from chimera_hpc.base.processes import is_gone, process_identity
 
 if TYPE_CHECKING:
     from distributed.security import Security
@@ -77,7 +77,7 @@ def fresh_certificate(name: str, store: Path) -> Iterator[Certificate]:
         certificate = Certificate(folder)
         _write(certificate)
         job = os.environ.get("SLURM_JOB_ID")
-        note = {"store": str(store), "process": process_mark(), "job": job}
+        note = {"store": str(store), "process": process_identity(), "job": job}
         create_exclusively(folder / _NOTE, json.dumps(note).encode())
         yield certificate
     finally:
@@ -109,7 +109,7 @@ def home() -> Path:
 
 
 def _is_alive_here(mark: str) -> bool:
-    here = process_mark().partition("-")[0]
+    here = process_identity().partition("-")[0]
     return mark.partition("-")[0] == here and not is_gone(mark)
 
 

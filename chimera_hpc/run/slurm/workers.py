@@ -138,7 +138,7 @@ class Keeper(threading.Thread):
             self.say(line)
 
 
-def check_wishes(wishes: Slurm, store: Path) -> None:
+def check_options(slurm_options: Slurm, store: Path) -> None:
     """Ask, before anything is begun, whether SLURM would take the job of a worker.
 
     Raises
@@ -146,22 +146,24 @@ def check_wishes(wishes: Slurm, store: Path) -> None:
     BadInput
         When it would not, or what is needed here is not there.
     """
-    check_interface(wishes)
-    queue.check(worker_request(store, wishes))
+    check_interface(slurm_options)
+    queue.check(worker_request(store, slurm_options))
     if any(find_spec(name) is None for name in ("dask_jobqueue", "cryptography")):
         raise BadInput(_EXTRA)
 
 
-def check_interface(wishes: Slurm) -> None:
+def check_interface(slurm_options: Slurm) -> None:
     """Raise BadInput when this machine has no such network interface."""
     known = [name for _, name in socket.if_nameindex()]
-    if wishes.interface is not None and wishes.interface not in known:
-        raise BadInput(f"interface {wishes.interface}: not here; allowed: {', '.join(known)}")
+    if slurm_options.interface is not None and slurm_options.interface not in known:
+        raise BadInput(
+            f"interface {slurm_options.interface}: not here; allowed: {', '.join(known)}"
+        )
 
 
 @contextmanager
 def slurm_cluster(
-    wishes: Slurm, store: Path, blocks: int, say: Say, patience: float = 60.0
+    slurm_options: Slurm, store: Path, blocks: int, say: Say, patience: float = 60.0
 ) -> Iterator[tuple[Client, Keeper]]:
     """Start a scheduler here and one-process workers in jobs of their own; give a client of it.
 
@@ -169,7 +171,7 @@ def slurm_cluster(
 
     Parameters
     ----------
-    wishes : Slurm
+    slurm_options : Slurm
     store : Path
         What the workers work on: names of jobs and the folder of logs follow from it.
     blocks : int
@@ -187,14 +189,14 @@ def slurm_cluster(
     import dask
     from distributed import Client
 
-    wanted = max(1, min(wishes.workers or WORKERS, blocks))
+    wanted = max(1, min(slurm_options.workers or WORKERS, blocks))
     name = job_name(store, _mark())
     logs = store.parent / LOGS
     logs.mkdir(exist_ok=True)
     with (
         dask.config.set(settings(patience)),
         fresh_certificate(name, store) as certificate,
-        _cluster(wishes, name, store, certificate) as cluster,
+        _cluster(slurm_options, name, store, certificate) as cluster,
     ):
         queue.check(cluster.job_script())
         with Client(cluster) as client:
@@ -220,37 +222,38 @@ def tunnel(scheduler: Any) -> str:
 
 def _mark() -> str:
     """Return what tells this run's jobs from those of another run on the same store."""
-    from chimera_hpc.base.processes import process_mark
+    from chimera_hpc.base.processes import process_identity
 
-    return process_mark()
+    return process_identity()
 
 
 def _prepare(client: Client) -> None:
-    from chimera_hpc.run.worker import Manners
+    from chimera_hpc.run.worker import SignalPlugin
 
-    client.register_plugin(Manners())
+    client.register_plugin(SignalPlugin())
 
 
-def _cluster(wishes: Slurm, name: str, store: Path, certificate: Certificate) -> Any:
+def _cluster(slurm_options: Slurm, name: str, store: Path, certificate: Certificate) -> Any:
     cluster, job = _classes()
     options = {"dashboard_address": f"{LOOPBACK}:0"}
     compile_once = compile_line(sys.executable, store)
-    marks = [f"export {WORKER}=1", *worker_settings()]
-    prologue = [*environment_lines(), *marks, *wishes.setup, compile_once]
+    memory = slurm_options.mem or MEMORY
+    told = [f"export {WORKER}=1", *worker_settings()]
+    prologue = [*environment_lines(), *told, *slurm_options.setup, compile_once]
     return cluster(
         job_cls=job,
         cores=1,
         processes=1,
-        memory=f"{wishes.mem or MEMORY}{'' if (wishes.mem or MEMORY)[-1].isdigit() else 'iB'}",
-        job_mem=wishes.mem or MEMORY,
-        walltime=wishes.time or TIME,
-        queue=wishes.partition,
-        account=wishes.account,
+        memory=memory if memory[-1].isdigit() else f"{memory}iB",
+        job_mem=memory,
+        walltime=slurm_options.time or TIME,
+        queue=slurm_options.partition,
+        account=slurm_options.account,
         job_name=name,
-        interface=wishes.interface,
+        interface=slurm_options.interface,
         log_directory=str(store.parent / LOGS),
         job_script_prologue=prologue,
-        job_extra_directives=["--requeue", "--open-mode=append", *wishes.extra],
+        job_extra_directives=["--requeue", "--open-mode=append", *slurm_options.extra],
         worker_extra_args=list(NO_DASHBOARD),
         scheduler_options=options,
         security=certificate.security(),

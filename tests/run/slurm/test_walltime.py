@@ -13,10 +13,10 @@ from slurm_sweeps import JOB, write_job
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
-from chimera_hpc.integrate import jit as _jit
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Slurm
 from chimera_hpc.run import block as task
+from chimera_hpc.run import compiled
 from chimera_hpc.run.slurm import options, queue, walltime, warm
 from chimera_hpc.run.slurm.queue import limit_seconds, one_line, seconds_of
 from chimera_hpc.run.slurm.script import SCRIPTS, Target, job_name
@@ -124,8 +124,12 @@ def test_the_command_line_wins_over_the_job_and_the_job_over_the_users_file(
     own.parent.mkdir()
     own.write_text('[slurm]\naccount = "mine"\npartition = "mine"\ntime = "1"\n')
     table = Slurm.model_validate({"partition": "jobs", "time": "2"})
-    wishes = options.wishes(table, {"time": "3", "mem": None})
-    assert (wishes.account, wishes.partition, wishes.time) == ("mine", "jobs", "3")
+    slurm_options = options.slurm_options(table, {"time": "3", "mem": None})
+    assert (slurm_options.account, slurm_options.partition, slurm_options.time) == (
+        "mine",
+        "jobs",
+        "3",
+    )
 
 
 def test_wishes_that_are_none_are_refused_with_their_place(
@@ -133,7 +137,7 @@ def test_wishes_that_are_none_are_refused_with_their_place(
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with pytest.raises(BadInput, match=r"slurm: mem = '1 potato': "):
-        options.wishes(Slurm.model_validate({}), {"mem": "1 potato"})
+        options.slurm_options(Slurm.model_validate({}), {"mem": "1 potato"})
     own = tmp_path / "chimera_hpc" / "config.toml"
     own.parent.mkdir()
     for text, told in (
@@ -143,7 +147,7 @@ def test_wishes_that_are_none_are_refused_with_their_place(
     ):
         own.write_text(text)
         with pytest.raises(BadInput, match=re.escape(f"{own}: {told}")):
-            options.wishes(Slurm.model_validate({}), {})
+            options.slurm_options(Slurm.model_validate({}), {})
 
 
 def test_an_unknown_key_of_the_jobs_table_is_refused_with_the_nearest_one() -> None:
@@ -155,21 +159,25 @@ def test_an_unknown_key_of_the_jobs_table_is_refused_with_the_nearest_one() -> N
 def test_the_kernels_are_compiled_once_for_a_job_file_a_folder_and_its_store(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(_jit, "cache_folder", lambda: str(tmp_path))
-    compiled = []
-    monkeypatch.setattr(task, "warm_up", lambda sweep, points: compiled.append(sweep.digest))
+    monkeypatch.setattr(compiled, "cache_folder", lambda: str(tmp_path / "kernels"))
+    file = tmp_path / "kernels" / "there" / "kernel-1.nbc"
+    file.parent.mkdir(parents=True)
+    found = []
+
+    def compile_(sweep: Sweep, points: object) -> None:
+        found.append(sweep.digest)
+        file.touch()
+
+    monkeypatch.setattr(task, "warm_up", compile_)
+    monkeypatch.setattr(compiled, "usable_cores", lambda: 1)
     job = write_job(tmp_path)
     store = Store.plan(tmp_path / "out" / "store.zarr", small())
-    for path in (job, job, tmp_path / "out", tmp_path / "out", store.path):
+    for path in (job, job, tmp_path / "out", store.path):
         warm.main(path)
-    assert compiled == [small().digest] * 2
-    marks = list(tmp_path.glob("compiled-*"))
-    assert len(marks) == 2
-    for mark in marks:
-        mark.write_text(str(tmp_path / "gone"))
-    warm.main(job)
-    assert len(compiled) == 3
+    assert found == [small().digest]
+    file.unlink()
+    warm.main(store.path)
+    assert len(found) == 2
 
 
 def test_a_worker_does_not_get_the_kernels_of_its_drivers_node(
@@ -195,7 +203,7 @@ def test_a_script_for_a_sweep_that_is_not_planned_says_all_that_plans_it(
 
 def test_arrays_of_all_jobs_are_refused() -> None:
     with pytest.raises(BadInput, match="--array is said by the keys array and at_once"):
-        options.wishes(Slurm.model_validate({"extra": ["--array=0-63%8"]}), {})
+        options.slurm_options(Slurm.model_validate({"extra": ["--array=0-63%8"]}), {})
 
 
 @pytest.mark.parametrize("mode", list(SCRIPTS))
