@@ -18,10 +18,16 @@ def floats(name: str, values: ArrayLike) -> Array:
     Raises
     ------
     BadInput
-        They are not numbers, or their rows differ in length.
+        They are not real numbers (complex, dates, words), some are masked, or their rows differ in
+        length.
     """
+    if np.ma.is_masked(values):
+        raise BadInput(f"{name} holds masked values: interpolate them or leave them out")
     try:
-        return np.asarray(values, dtype=np.float64)
+        array = np.asarray(values)
+        if array.dtype.kind not in "biufO":
+            raise BadInput(f"{name} must be an array of real numbers, not {array.dtype}")
+        return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise BadInput(f"{name} must be an array of real numbers") from error
 

@@ -6,11 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 Array = NDArray[np.float64]
 
 _JUMP = 1.5
 """A step between two times from which samples are missing between them, in usual steps."""
+
+
+_NEAR = 21
+_CHANGING = 3.0
 
 
 @dataclass(frozen=True)
@@ -38,11 +43,23 @@ def called(name: str) -> str:
     return f"node {name}" if name.isdecimal() else name
 
 
-def find_gaps(t: Array, u: Array, step: float) -> list[Gap]:
+def nearby(t: Array) -> Array:
+    """Return the usual step (T - 1,) around each: the median of 21, three times where it changes.
+
+    An adaptive solver's steps grow and shrink; they are no gaps.
+    """
+    steps = np.diff(t)
+    local = median_filter(steps, _NEAR, mode="nearest")
+    changing = np.mean(np.abs(local / np.median(steps) - 1.0) > 0.5) > 0.01
+    return np.asarray(local * (_CHANGING if changing else 1.0))
+
+
+def find_gaps(t: Array, u: Array, step: float | Array) -> list[Gap]:
     """Return the gaps in u (T, N), longest first: times left out, and values that are NaN."""
     gaps = []
-    for i in np.flatnonzero(np.diff(t) > _JUMP * step).tolist():
-        count = round((t[i + 1] - t[i]) / step) - 1
+    usual = np.broadcast_to(step, len(t) - 1)
+    for i in np.flatnonzero(np.diff(t) > _JUMP * usual).tolist():
+        count = round((t[i + 1] - t[i]) / usual[i]) - 1
         gaps.append(Gap(float(t[i]), float(t[i + 1]), max(count, 1)))
     for node in np.flatnonzero(np.isnan(u).any(axis=0)).tolist():
         for start, stop in _runs(np.isnan(u[:, node])):
@@ -51,7 +68,7 @@ def find_gaps(t: Array, u: Array, step: float) -> list[Gap]:
     return sorted(gaps, key=lambda gap: -gap.samples)
 
 
-def longest_stretch(t: Array, u: Array, step: float, bridge: int) -> slice:
+def longest_stretch(t: Array, u: Array, step: float | Array, bridge: int) -> slice:
     """Return the longest run of samples without a gap of more than `bridge` samples.
 
     It begins and ends with a sample at which every node has a value; empty where there is none.

@@ -27,6 +27,10 @@ Array = NDArray[np.float64]
 
 FEW_SAMPLES = 20.0
 """Samples a period below which maxima, and with them windows, are placed too coarsely."""
+_FLAT = 1e-6
+"""Standard deviation, in root mean squares of the signal, below which it is steady."""
+_SMALL = 1e-2
+"""The same, below which the threshold of a sweep counts."""
 _BLOCKS = 20
 _MAXIMA = 1.02
 """Maxima a turn of the clock beyond which some are put down to noise."""
@@ -73,14 +77,19 @@ class Verdict:
     other_distance: float
 
     @property
+    def outside(self) -> bool:
+        """Whether it is farther from the nearest run than any run of the atlas is from the next."""
+        return self.confidence == 0.0
+
+    @property
     def sentence(self) -> str:
         """How far to trust it, in words."""
         if self.confidence >= 0.05:
             where = "among the atlas's own runs"
-        elif self.distance < self.other_distance / 2:
-            where = "outside the atlas's runs, but nearest to this class by far"
+        elif self.outside:
+            where = "farther than any of the atlas's own runs is from its next: outside"
         else:
-            where = "outside the atlas's runs: it has little to say here"
+            where = "at the edge of the atlas's runs"
         return where
 
 
@@ -97,13 +106,15 @@ class Measured:
 
     @property
     def name(self) -> str | None:
-        """The class: of the atlas, or ``steady`` or ``no_window``; None without an atlas."""
+        """The class: of the atlas, ``steady`` or ``no_window``; None without or outside one."""
         if self.features.status is not Status.DONE:
             return self.features.status.name.lower()
-        return None if self.verdict is None else self.verdict.name
+        return None if self.verdict is None or self.verdict.outside else self.verdict.name
 
 
-def measure(made: Prepared, settings: Features, ring: bool, judge: Judge | None) -> Measured:
+def measure(
+    made: Prepared, settings: Features, ring: bool, judge: Judge | None, absolute: bool = False
+) -> Measured:
     """Measure signals on an even grid, and judge them by an atlas if there is one.
 
     Parameters
@@ -114,6 +125,8 @@ def measure(made: Prepared, settings: Features, ring: bool, judge: Judge | None)
     ring : bool
         Whether the last node is a neighbour of the first.
     judge : Judge or None
+    absolute : bool
+        Whether the user sets ``steady_threshold``, in the unit of the signal.
 
     Raises
     ------
@@ -123,11 +136,11 @@ def measure(made: Prepared, settings: Features, ring: bool, judge: Judge | None)
     n_nodes, least = made.u.shape[1], 3 if ring else 2
     if n_nodes < least:
         raise BadInput(f"{n_nodes} nodes: a {'ring' if ring else 'chain'} has at least {least}")
-    features = features_of(made, settings)
+    limit, warnings = _steady_below(made.u, settings.steady_threshold, judge, absolute)
+    features = features_of(made, settings, limit)
     triplet = total_variation_arrays(
         features.phase, features.amplitude, features.frequency, ring=ring
     )
-    warnings = []
     fastest = float(np.nanmax(np.append(features.frequency, 0.0)))
     samples = 1.0 / (fastest * made.recorded_step) if fastest > 0.0 else float("nan")
     for what, step in (("the recording", made.recorded_step), ("the grid", made.step)):
@@ -146,9 +159,39 @@ def measure(made: Prepared, settings: Features, ring: bool, judge: Judge | None)
     return Measured(features, triplet, samples, verdict, tuple(warnings))
 
 
-def features_of(made: Prepared, settings: Features) -> FourierFeatures:
-    """Return the Fourier features of a prepared recording."""
-    return fourier_features(made.t, made.u, **settings.options())
+def features_of(
+    made: Prepared, settings: Features, steady_threshold: float | None = None
+) -> FourierFeatures:
+    """Return the Fourier features of a prepared recording; steady is relative unless told."""
+    options = settings.options()
+    limit = _FLAT * _size(made.u) if steady_threshold is None else steady_threshold
+    return fourier_features(made.t, made.u, **{**options, "steady_threshold": limit})
+
+
+def _size(u: Array) -> float:
+    """Root of the mean square of all values."""
+    return float(np.sqrt(np.mean(np.square(u))))
+
+
+def _steady_below(
+    u: Array, threshold: float, judge: Judge | None, absolute: bool
+) -> tuple[float, list[str]]:
+    """Return the standard deviation below which signals are steady, and warnings.
+
+    It is relative to the signal: `_FLAT` of the root mean square. That of the sweep or the user has
+    the unit of the signal: the user's is taken, the sweep's only for what is small in itself too.
+    """
+    deviation, size = float(u.std(axis=0).mean()), _size(u)
+    own = _FLAT * size
+    if deviation >= threshold or deviation < own or not (absolute or judge is not None):
+        return (threshold if absolute else own), []
+    said = (
+        f"signals vary by {deviation:.3g} (standard deviation), less than steady_threshold = "
+        f"{threshold:g} in the unit of the signal"
+    )
+    if absolute or deviation < _SMALL * size:
+        return threshold, [f"steady: {said}"]
+    return own, [f"{said}: the sweep would call it steady; other units? --factors or --rescale"]
 
 
 def verdict_of(atlas: Atlas, triplet: Array) -> Verdict:

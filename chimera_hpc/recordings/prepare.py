@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,8 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch
+from chimera_hpc.recordings.columns import listed, places, screened, some_of, suspects
+from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch, nearby
 from chimera_hpc.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -21,6 +21,10 @@ _EVEN = 1e-2
 """Largest departure of a time from an even grid, in steps: as `fourier_features` allows."""
 _SAME = 1e-6
 """Relative difference below which two steps are the same."""
+_PADDING = 15
+"""Samples that the low-pass filter reflects at each end."""
+_LEAST = 1e-100
+"""Smallest step of times whose powers are numbers."""
 _MOST = 2 * 10**8
 """Most numbers of a series after interpolation."""
 
@@ -61,15 +65,18 @@ def with_times(recording: Recording, step: float | None) -> Recording:
     BadInput
         Neither has times, or both; times that are not finite or do not rise.
     """
+    own = recording.t is not None
+    if step is None or (np.isfinite(step) and step > 0.0):
+        recording = screened(recording, step)
     if recording.t is None:
         if step is None:
             raise BadInput("the file has no times: --step X gives the time between two samples")
         if not (np.isfinite(step) and step > 0.0):
             raise BadInput(f"--step {step}: a number above 0 is needed")
         t = step * np.arange(len(recording.u), dtype=np.float64)
-        return Recording(t, recording.u, recording.names, recording.notes)
+        return replace(recording, t=t)
     t = recording.t
-    if step is not None:
+    if own and step is not None:
         raise BadInput("the file has times of its own: leave --step out")
     wrong = np.flatnonzero(~np.isfinite(t))
     if len(wrong):
@@ -88,26 +95,13 @@ def in_order(recording: Recording, order: str | None) -> Recording:
     """
     if order is None:
         return recording
-    text = Path(order).read_text(encoding="utf-8") if Path(order).is_file() else order
-    words = [word for word in text.replace(",", " ").split() if word]
-    columns = [_column(recording.names, word) for word in words]
-    if len(set(columns)) < len(columns):
-        twice = next(word for word in words if words.count(word) > 1)
-        raise BadInput(f"--order: {twice} is there twice")
-    if not columns:
-        raise BadInput("--order: no node is named")
+    columns = places(recording.names, listed(order, "--order"), "--order")
     names = tuple(recording.names[i] for i in columns)
     left = recording.u.shape[1] - len(columns)
-    note = f"{len(columns)} nodes in the order given" + (f", {left} left out" if left else "")
-    return Recording(recording.t, recording.u[:, columns], names, (*recording.notes, note))
-
-
-def _column(names: Sequence[str], word: str) -> int:
-    if word in names:
-        return names.index(word)
-    if word.isdecimal() and int(word) < len(names):
-        return int(word)
-    raise BadInput(f"--order: {word} is no node; there are {len(names)}: {names[0]} to {names[-1]}")
+    note = f"in the order given: {some_of(names)}" + (f"; {left} left out" if left else "")
+    return replace(
+        recording, u=recording.u[:, columns], names=names, notes=(*recording.notes, note)
+    )
 
 
 def prepare(
@@ -147,6 +141,8 @@ def prepare(
     assert recording.t is not None
     t, u = recording.t * scale[0], np.where(np.isfinite(recording.u), recording.u, np.nan)
     u *= scale[1]
+    if not ((np.diff(t) > _LEAST).all() and np.isfinite(t).all() and not np.isinf(u).any()):
+        raise BadInput("--factors: times or signals leave the range of numbers")
     first, last = (x if x is None else x * scale[0] for x in span)
     inside = (t >= (t[0] if first is None else first)) & (t <= (t[-1] if last is None else last))
     t, u = t[inside], u[inside]
@@ -154,8 +150,9 @@ def prepare(
         raise BadInput(f"{len(t)} samples between --start and --end: too few")
     _refuse_empty(u, recording.names)
     usual = float(np.median(np.diff(t)))
-    gaps = find_gaps(t, u, usual)
-    part = longest_stretch(t, u, usual, bridge)
+    around = nearby(t)
+    gaps = find_gaps(t, u, around)
+    part = longest_stretch(t, u, around, bridge)
     notes, warned = list(recording.notes), []
     if gaps:
         values, times = int(np.isnan(u).sum()), sum(g.samples for g in gaps if g.node is None)
@@ -170,6 +167,7 @@ def prepare(
             f"taken: {t[part][0]:.6g} to {t[part][-1]:.6g}, {part.stop - part.start} of {len(t)} "
             f"samples, the longest stretch without gaps of more than {bridge} samples"
         )
+    warned += suspects(u[part], recording.names)
     made_t, made_u, note = _on_grid(t[part], u[part], usual, step)
     if lowpass is not None:
         made_u = _smooth(made_u, lowpass / scale[0], made_t, usual)
@@ -194,7 +192,8 @@ def _on_grid(t: Array, u: Array, usual: float, step: float | None) -> tuple[Arra
             "time to the atlas's"
         )
     grid = t[0] + wanted * np.arange(count)
-    why = [] if even else ["uneven times"]
+    steps = np.diff(t)
+    why = [] if even else [f"uneven times: steps from {steps.min():.3g} to {steps.max():.3g}"]
     why += [] if whole else ["missing values"]
     why += [] if abs(own - wanted) <= _SAME * wanted else [f"recorded at {usual:.6g}"]
     if whole:
@@ -215,6 +214,8 @@ def _smooth(u: Array, cut: float, t: Array, recorded_step: float) -> Array:
             f"--lowpass: {cut:g} a unit of time is not between 0 and half the sampling frequency, "
             f"{0.5 / max(step, recorded_step):g}"
         )
+    if len(u) <= _PADDING:
+        raise BadInput(f"--lowpass: {len(u)} samples are too few, {_PADDING + 1} are needed")
     sections = butter(4, 2.0 * cut * step, output="sos")
     return np.asarray(sosfiltfilt(sections, u, axis=0))
 
@@ -224,5 +225,5 @@ def _refuse_empty(u: Array, names: Sequence[str]) -> None:
     if len(empty):
         some = ", ".join(names[i] for i in empty[:5].tolist()) + (", ..." * (len(empty) > 5))
         raise BadInput(
-            f"more than half of the values of node {some} is missing; --order leaves out"
+            f"more than half of the values of node {some} is missing; --drop leaves it out"
         )

@@ -15,8 +15,11 @@ from typing import Any
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.recordings.recording import Choice, Recording, as_signals, as_times, turned
+from chimera_hpc.recordings.columns import without
+from chimera_hpc.recordings.recording import TIME, Choice, Recording, as_signals, as_times, turned
 from chimera_hpc.recordings.tables import read_table
+
+Reader = Callable[[Path, Choice], Recording]
 
 _TIMES = ("t", "time", "times")
 _SIGNALS = ("u", "x", "y", "data", "signal", "signals")
@@ -29,7 +32,8 @@ def read_recording(path: Path, choice: Choice) -> Recording:
     Parameters
     ----------
     path : Path
-        .npz, .npy, .csv (.tsv, .txt, .dat), .nc (NetCDF), or the folder of a Zarr store.
+        .npz, .npy, .csv (.tsv, .txt, .dat; also .gz), .mat, .nc (NetCDF), or the folder of a
+        Zarr store.
     choice : Choice
 
     Raises
@@ -38,38 +42,84 @@ def read_recording(path: Path, choice: Choice) -> Recording:
         No such file, another format, a file with pickled objects, or one that leaves open what the
         signals or the times are.
     """
-    if (path / "store.zarr").is_dir():
-        path = path / "store.zarr"
-    reader = READERS.get(path.suffix.lower())
-    if path.is_dir():
-        if not any((path / name).is_file() for name in _ZARR):
-            raise BadInput(f"{path}: a folder that is no Zarr store")
-        reader = _read_zarr
-    if not path.exists():
-        raise BadInput(f"{path}: no such file")
-    if reader is None:
-        known = ", ".join(READERS)
-        raise BadInput(f"{path}: allowed are {known} and Zarr stores")
     try:
-        return turned(reader(path, choice), choice)
+        if (path / "store.zarr").is_dir():
+            path = path / "store.zarr"
+        with _quiet():
+            reader = _reader(path)
+            made = turned(reader(path, choice), choice)
+        return made if reader is read_table else without(made, choice.drop)
     except BadInput as error:
         raise BadInput(f"{path}: {error}") from None
     except (OSError, EOFError, UnicodeDecodeError, zipfile.BadZipFile) as error:
         raise BadInput(f"{path}: can't be read: {_line(error)}") from None
 
 
+def _reader(path: Path) -> Reader:
+    if path.is_dir():
+        if not any((path / name).is_file() for name in _ZARR):
+            raise BadInput("a folder that is no Zarr store")
+        return _read_zarr
+    if not path.exists():
+        raise BadInput("no such file")
+    name = path.name.lower()
+    reader = READERS.get(Path(name.removesuffix(".gz")).suffix)
+    if reader is None or (name.endswith(".gz") and reader is not read_table):
+        raise BadInput(f"allowed are {', '.join(READERS)}, tables with .gz too, and Zarr stores")
+    return reader
+
+
 def _read_npy(path: Path, choice: Choice) -> Recording:
-    return Recording(None, as_signals("array", _load(path)))
+    u = as_signals("array", _load(path))
+    if choice.time is None:
+        return Recording(None, u)
+    u = u.T if choice.transpose else u
+    if not choice.time.isdecimal() or int(choice.time) >= u.shape[1]:
+        raise BadInput(f"--time {choice.time}: columns are 0 to {u.shape[1] - 1}")
+    column = int(choice.time)
+    t, u = u[:, column], np.delete(u, column, axis=1)
+    note = f"times: column {column}"
+    return Recording(t, u.T if choice.transpose else u, (), (note,))
 
 
 def _read_npz(path: Path, choice: Choice) -> Recording:
     with _load(path) as archive:
-        shapes = {name: archive[name] for name in _names(archive)}
+        return _arrays({name: archive[name] for name in _names(archive)}, choice)
+
+
+def _read_mat(path: Path, choice: Choice) -> Recording:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        arrays = loadmat(path)
+    except NotImplementedError:
+        arrays = _read_mat73(path)
+    except (MatReadError, ValueError, TypeError, IndexError, KeyError) as error:
+        raise BadInput(f"can't be read as a MATLAB file: {_line(error)}") from None
+    plain = {name: array for name, array in arrays.items() if not name.startswith("_")}
+    return _arrays({k: a for k, a in plain.items() if a.dtype.kind in "iufc"}, choice)
+
+
+def _read_mat73(path: Path) -> dict[str, Any]:
+    try:
+        import h5py  # type: ignore[import-not-found, unused-ignore]
+    except ImportError:
+        raise BadInput("is a MATLAB 7.3 file: python -m pip install h5py") from None
+    with h5py.File(path) as file:  # HDF5 has the axes of MATLAB in reverse
+        return {k: np.asarray(a).T for k, a in file.items() if isinstance(a, h5py.Dataset)}
+
+
+def _arrays(shapes: dict[str, Any], choice: Choice) -> Recording:
+    """Return the recording in arrays with names; (T, 1) and (1, T) are vectors."""
+    shapes = {k: a.ravel() if a.ndim == 2 and 1 in a.shape else a for k, a in shapes.items()}
     signals = {name: array for name, array in shapes.items() if array.ndim == 2}
     name = _choose("array", choice.variable, signals, list(shapes))
     time = choice.time
     if time is None:
-        time = next((key for key in shapes if key.lower() in _TIMES and key != name), None)
+        time = next(
+            (key for key, a in shapes.items() if TIME.search(key) and a.ndim and key != name), None
+        )
     elif time not in shapes:
         raise BadInput(f"--time {time}: the file has {', '.join(shapes)}")
     notes = [f"signals: array {name}"] + ([f"times: array {time}"] if time else [])
@@ -106,7 +156,7 @@ def _read_netcdf(path: Path, choice: Choice) -> Recording:
     import xarray as xr
 
     try:
-        with _quiet(), xr.open_dataset(path) as dataset:
+        with xr.open_dataset(path) as dataset:
             return _labelled(dataset, choice)
     except BadInput:
         raise
@@ -121,7 +171,7 @@ def _read_zarr(path: Path, choice: Choice) -> Recording:
     import xarray as xr
 
     try:
-        with _quiet(), xr.open_zarr(path, chunks=None) as dataset:
+        with xr.open_zarr(path, chunks=None) as dataset:
             return _labelled(dataset, choice)
     except BadInput:
         raise
@@ -205,12 +255,13 @@ def _line(error: Exception) -> str:
     return text if len(text) <= 200 else text[:197] + "..."
 
 
-READERS: dict[str, Callable[[Path, Choice], Recording]] = {
+READERS: dict[str, Reader] = {
     ".npz": _read_npz,
     ".npy": _read_npy,
     ".csv": read_table,
     ".tsv": read_table,
     ".txt": read_table,
     ".dat": read_table,
+    ".mat": _read_mat,
     ".nc": _read_netcdf,
 }

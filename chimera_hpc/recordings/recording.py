@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,16 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 
 Array = NDArray[np.float64]
+
+TIME = re.compile(
+    r"^(t|s|ms|secs?|seconds?|msec|zeit|uhrzeit|elapsed|datum)(?![^\W_])"
+    r"|(?<![^\W_])(times?|timestamps?|dates?|datetime|seconds|zeit|temps|tiempo|tempo|elapsed)"
+    r"(?![^\W_])",
+    re.IGNORECASE,
+)
+"""What columns and arrays of times are called: time, time_s, t [s], Zeit, elapsed, ..."""
+_SMOOTH = 4.0
+"""Factor between mean squares of steps along two axes from which the axes may be swapped."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +38,8 @@ class Choice:
     """Whether rows are nodes and columns are times."""
     no_times: bool = False
     """Whether every column is a node: the user gives the step."""
+    drop: tuple[str, ...] = ()
+    """Columns to leave out, by name or number from 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +82,7 @@ def as_signals(name: str, values: Any) -> Array:
 def as_times(name: str, values: Any) -> Array:
     """Return times as float64, dates in seconds since the first; BadInput for others."""
     times = np.asarray(values)
+    times = times.ravel() if times.ndim == 2 and 1 in times.shape else times
     if times.dtype.kind in "mM":
         whole = times.astype("datetime64[ns]" if times.dtype.kind == "M" else "timedelta64[ns]")
         if np.isnat(whole).any():
@@ -84,10 +98,21 @@ def turned(recording: Recording, choice: Choice) -> Recording:
     """Put times along the first axis, as the user or the number of times says."""
     u, t = recording.u, recording.t
     fits, fits_turned = (t is not None and len(t) == n for n in u.shape)
+    along, across = (float(np.nanmean(np.diff(u, axis=i) ** 2)) if min(u.shape) > 1 else 0.0
+                     for i in (0, 1))  # fmt: skip
+    open_ = not choice.transpose and (t is None or (fits and fits_turned))
+    if open_ and t is None and u.shape[1] > u.shape[0] and across < along:
+        raise BadInput(
+            f"{u.shape[0]} times of {u.shape[1]} nodes, smoother along the rows: are these times? "
+            "--transpose turns them; else save the times too (.npz with an array t)"
+        )
     if choice.transpose or (fits_turned and not fits):
         note = f"rows are nodes: {u.shape[0]} nodes, {u.shape[1]} times"
         recording = Recording(t, u.T, (), (*recording.notes, note))
         u = recording.u
+    elif open_ and across < along / _SMOOTH:
+        note = "rows are smoother than columns: if they are nodes, --transpose turns them"
+        recording = replace(recording, notes=(*recording.notes, note))
     if t is not None and len(t) != len(u):
         raise BadInput(f"{len(t)} times for {len(u)} samples of {u.shape[1]} nodes")
     return recording

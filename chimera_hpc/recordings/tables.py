@@ -2,106 +2,270 @@
 
 from __future__ import annotations
 
+import csv
+import gzip
+import io
 import re
-import warnings
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.recordings.recording import Choice, Recording, as_signals, as_times
+from chimera_hpc.recordings.columns import is_counter, places, without
+from chimera_hpc.recordings.dates import compact_dates, seconds_of
+from chimera_hpc.recordings.recording import TIME, Array, Choice, Recording
 
-_HEAD = 50
-_DELIMITERS = (";", "\t", ",")
-_MISSING = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
-_TIME = re.compile(r"(t|times?|timestamp|date|datetime|seconds)\b", re.IGNORECASE)
+_HEAD = 200
+_MISSING = ["", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "#n/a",
+            "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!"]  # fmt: skip
+_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
 
 def read_table(path: Path, choice: Choice) -> Recording:
-    """Read delimited text: comma, semicolon, tab or blanks; ``#`` begins a comment.
+    """Read delimited text: comma, semicolon, tab or blanks; a line with ``#`` first is a comment.
 
-    A first line with words names the columns. Times are the column that ``--time`` names, else the
-    one that is called time (or t, date, ...), else, in a table without names, a first column that
-    rises throughout.
+    Lines with words above the numbers name the columns (the first with as many cells as they have)
+    or are left out (units, a preamble). Numbers have a point or a comma. Times are the column that
+    ``--time`` names, else the one that is called so, else, without names, a first one that rises.
     """
+    lines = _lines(path)
+    delimiter = _delimiter(lines)
+    head, lines = _head(lines, delimiter)
+    names, table, notes = _named(head, lines, delimiter)
+    every = list(names) or [str(i) for i in range(len(table))]
+    left = set(places(every, choice.drop, "--drop")) if names and set(choice.drop) <= set(
+        every) else set()  # fmt: skip
+    kept = [i for i in range(len(table)) if i not in left]
+    columns = {i: _numbers(every[i], table[i]) for i in kept}
+    time, note = _time(columns, every, choice, bool(names))
+    nodes = []
+    for i in (i for i in kept if i != time):
+        values = columns[i]
+        if isinstance(values, np.ndarray):
+            if names and not names[i] and np.isnan(values).all():
+                continue  # a delimiter at the end of each line
+            nodes.append(i)
+        elif time is not None and TIME.search(every[i]):
+            notes.append(f"column {every[i]} is left out: the times are column {every[time]}")
+        else:
+            raise BadInput(f"column {every[i]}: {_word(values)!r} is not a number; --drop leaves "
+                           "columns out")  # fmt: skip
+    if not nodes:
+        raise BadInput("has no column of signals")
+    t = None
+    if time is not None:
+        t, how = _times(columns[time], every[time])
+        notes += [note, *how]
+    else:
+        notes.append("every column is a node")
+    u = np.column_stack([columns[i] for i in nodes])
+    made = Recording(t, u, tuple(every[i] or "index" for i in nodes) if names else (), tuple(notes))
+    return made if left else without(made, choice.drop)
+
+
+def _lines(path: Path) -> list[str]:
+    raw = path.read_bytes()
+    raw = gzip.decompress(raw) if path.suffix.lower() == ".gz" else raw
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        text = raw.decode("utf-16")
+    else:
+        try:
+            text = raw.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = raw.decode("cp1252", "replace")
+    if "\0" in text:
+        raise BadInput("can't be read as text: it holds bytes of value 0")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    found = [line for line in lines if line.strip(" ;,\t") and not line.lstrip().startswith("#")]
+    if not found:
+        raise BadInput("is empty")
+    return found
+
+
+def _delimiter(lines: list[str]) -> str | None:
+    """Return what stands between the cells of the last lines; None for blanks."""
+    tail = lines[-_HEAD:][-max(1, len(lines) // 2) :]
+    for mark in (";", "\t"):
+        if all(mark in line for line in tail):
+            return mark
+    blanks = all(len(w := line.split()) > 1 and all(map(_COMMA.fullmatch, w)) for line in tail)
+    return "," if not blanks and all("," in line for line in tail) else None
+
+
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return next(csv.reader([" ".join(line.split())], delimiter=" "))
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+
+
+def _head(lines: list[str], delimiter: str | None) -> tuple[list[list[str]], list[str]]:
+    """Part the lines of words from those of numbers."""
+    head: list[list[str]] = []
+    for i, line in enumerate(lines[:_HEAD]):
+        cells = _cells(line, delimiter)
+        if any(_number(c) for c in cells) and all(_number(c) or _blank(c) or _clock(c)
+                                                 for c in cells):  # fmt: skip
+            # Columns that are called 0, 1, 2, ... (as pandas writes an index of its own).
+            start = (
+                1 if not cells[0] and _cells(lines[min(i + 1, len(lines) - 1)], delimiter)[0] else 0
+            )
+            called = [c for c in cells[start:] if c]
+            if head or not (len(called) > 3 and called in (
+                    [str(k + b) for k in range(len(called))] for b in (0, 1))):  # fmt: skip
+                return head, lines[i:]
+        elif len(head) and any(_number(c) for c in cells) and len(cells) == len(head[-1]):
+            return head, lines[i:]  # the number that is a word is named later
+        head.append(cells)
+    raise BadInput("has lines of words and no other")
+
+
+def _named(
+    head: list[list[str]], lines: list[str], delimiter: str | None
+) -> tuple[list[str], list[Any], list[str]]:
+    """Return the names, the columns as pandas reads them, and notes."""
     import pandas as pd
 
-    with path.open(encoding="utf-8-sig") as file:
-        lines = (line.partition("#")[0].strip("\n\r ") for line in file)
-        head = [line for line, _ in zip(filter(None, lines), range(_HEAD), strict=False)]
-    if not head:
-        raise BadInput("is empty")
-    delimiter = next((d for d in _DELIMITERS if d in head[-1]), None)
-    decimal = "," if delimiter == ";" and "," in head[-1] else "."
-    named = any(_is_word(cell, decimal) for cell in head[0].split(delimiter))
-    if named and len(head) == 1:
-        raise BadInput("has a line of names and no other")
+    count = _count(lines, delimiter)
+    notes, names = [], []
+    fitting = [cells for cells in head if len(cells) in (count, count - 1)]
+    if fitting:
+        names = fitting[0]
+        if len(names) < count:  # a delimiter ends each line, or R wrote the names of the rows
+            ends = not _cells(lines[0], delimiter)[-1]
+            names = [*names, ""] if ends else ["", *names]
+        notes += [f"left out above the numbers: {' '.join(c)}" for c in head if c is not fitting[0]]
+    elif head:
+        raise BadInput(f"can't be read as a table: {len(head[-1])} names for {count} columns")
+    seen: Counter[str] = Counter()
+    for i, name in enumerate(names):
+        seen[name] += 1
+        if name and seen[name] > 1:
+            names[i] = f"{name}.{seen[name] - 1}"
+            notes.append(f"two columns are called {name}: the later is {names[i]}")
     try:
-        with warnings.catch_warnings(action="error"):  # a line that is too long loses data
-            table = pd.read_csv(
-                path,
-                sep=delimiter or r"\s+",
-                header=0 if named else None,
-                comment="#",
-                decimal=decimal,
-                encoding="utf-8-sig",
-                skipinitialspace=True,
-                index_col=False,
-                na_values=["-", "inf", "-inf"],
-            )
-    except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
+        table = pd.read_csv(
+            io.StringIO("\n".join(lines)),
+            sep=delimiter or r"\s+",
+            header=None,
+            names=list(range(count)),
+            skipinitialspace=True,
+            index_col=False,
+            low_memory=False,
+            na_values=[*_MISSING, *map(str.upper, _MISSING)],
+        )
+    except (pd.errors.ParserError, ValueError) as error:
         raise BadInput(f"can't be read as a table: {' '.join(str(error).split())}") from None
-    table.columns = [str(name).strip() for name in table.columns]
-    time, note = _time_column(table, choice, named)
-    nodes = [name for name in table.columns if name != time]
-    for name in nodes:
-        if table[name].dtype.kind not in "iuf":
-            raise BadInput(f"column {name}: {_first_word(table[name])!r} is not a number")
-    t = None if time is None else as_times(time, _times(table[time], time))
-    u = as_signals("table", table[nodes].to_numpy(dtype=np.float64))
-    return Recording(t, u, tuple(nodes) if named else (), (note,))
+    return names, [table[i] for i in range(count)], notes
 
 
-def _time_column(table: Any, choice: Choice, named: bool) -> tuple[str | None, str]:
-    columns = list(table.columns)
-    if choice.no_times:
-        return None, "every column is a node"
-    if choice.time is not None:
-        if choice.time not in columns:
-            some = ", ".join(columns[:10]) + (", ..." if len(columns) > 10 else "")
-            raise BadInput(f"--time {choice.time}: the columns are {some}")
-        return choice.time, f"times: column {choice.time}"
-    if named:
-        found = next((name for name in columns if _TIME.match(name)), None)
-        return found, f"times: column {found}" if found else "every column is a node"
-    first = table[columns[0]]
-    values = first.to_numpy()
-    rises = len(columns) > 1 and first.dtype.kind in "iuf" and bool((np.diff(values) > 0).all())
-    if rises:
-        return columns[0], "times: the first column, which rises throughout"
-    return None, "every column is a node"
+def _count(lines: list[str], delimiter: str | None) -> int:
+    """Return the cells of a line; BadInput where lines differ: decimal commas would shift them."""
+    if '"' in lines[0] or '"' in lines[-1]:
+        counts = [len(_cells(line, delimiter)) for line in lines]
+    elif delimiter is None:
+        counts = [len(line.split()) for line in lines]
+    else:
+        counts = [line.count(delimiter) + 1 for line in lines]
+    usual = Counter(counts).most_common(1)[0][0]
+    wrong = next((i for i, n in enumerate(counts[:-1]) if n != usual), None)
+    wrong = len(counts) - 1 if wrong is None and counts[-1] > usual else wrong
+    if wrong is not None:
+        raise BadInput(f"can't be read as a table: line {wrong + 1} of the numbers has "
+                       f"{counts[wrong]} cells, others {usual}")  # fmt: skip
+    return usual
 
 
-def _times(column: Any, name: str) -> Any:
+def _numbers(name: str, column: Any) -> Any:
+    """Return a column as float64, or as its words where they are no numbers."""
     import pandas as pd
 
     if column.dtype.kind in "iuf":
-        return column.to_numpy()
+        return column.to_numpy(dtype=np.float64)
+    words = column.astype(object)
+    known = words.dropna().astype(str).str.strip()
+    if not known.str.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?").all():
+        return words
+    comma = known.str.contains(",", regex=False)
+    integer = known.str.fullmatch(r"[-+]?\d+")
+    thousands = known.str.fullmatch(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
+    if (comma & known.str.contains(".", regex=False)).any() or not (
+        comma | integer | known.str.contains("[eE]")
+    ).all():
+        return words if not comma.any() else _refuse_commas(name, known)
+    if (thousands | integer).all() and not (known[comma].str.startswith(("0", "-0"))).any():
+        return _refuse_commas(name, known)
+    made = pd.to_numeric(known.str.replace(",", ".", regex=False), errors="coerce")
+    return words if made.isna().any() else made.reindex(column.index).to_numpy(dtype=np.float64)
+
+
+def _refuse_commas(name: str, known: Any) -> Any:
+    word = next(word for word in known if "," in word)
+    raise BadInput(f"column {name}: {word!r}: is the comma a decimal one? write points, without "
+                   "separators of thousands")  # fmt: skip
+
+
+def _time(
+    columns: dict[int, Any], names: list[str], choice: Choice, named: bool
+) -> tuple[int | None, str]:
+    """Return the column of the times and how it was found."""
+    if choice.time is not None:
+        found = [i for i in columns if names[i] == choice.time]
+        if not found:
+            some = ", ".join(names[:10]) + (", ..." if len(names) > 10 else "")
+            raise BadInput(f"--time {choice.time}: the columns are {some}")
+        return found[0], f"times: column {choice.time}"
+    first, note = next(iter(columns)), ""
+    if named:
+        likely = [i for i in columns if TIME.search(names[i]) or (i == first and not names[i])]
+        likely = [i for i in likely if names[i] or not is_counter(columns[i])]
+        likely += [i for i in columns if not likely and not isinstance(columns[i], np.ndarray)]
+        found = [i for i in likely if _may_rise(columns[i], names[i])] or [
+            i for i in likely if TIME.search(names[i])]  # fmt: skip
+        note = f"times: column {names[found[0]] or 'without a name'}" if found else ""
+    else:
+        rises = len(columns) > 1 and not is_counter(columns[first])
+        found = [first] if rises and _may_rise(columns[first], names[first]) else []
+        note = "times: the first column, which rises throughout"
+    if found and choice.no_times:
+        raise BadInput(f"column {names[found[0]]} holds times: leave --step out, or --drop "
+                       f"{names[found[0]]}")  # fmt: skip
+    return (found[0], note) if found else (None, "")
+
+
+def _may_rise(values: Any, name: str) -> bool:
     try:
-        return pd.to_datetime(column, utc=True).dt.tz_localize(None).to_numpy()
-    except (ValueError, TypeError):
-        raise BadInput(f"column {name}: {_first_word(column)!r} is no time") from None
+        t = _times(values, name)[0]
+    except BadInput:
+        return False
+    return bool((np.diff(t) > 0.0).all())
 
 
-def _first_word(column: Any) -> str:
-    return next((str(x) for x in column if _is_word(str(x), ".")), str(column.iloc[0]))
+def _times(values: Any, name: str) -> tuple[Array, list[str]]:
+    """Return times, dates in seconds since the first, and notes."""
+    if isinstance(values, np.ndarray):
+        return compact_dates(values) or (values, [])
+    if values.isna().any():
+        raise BadInput(f"column {name}: time {int(values.isna().argmax())} (from 0) is missing")
+    return seconds_of(values.astype(str).str.strip(), name)
 
 
-def _is_word(cell: str, decimal: str) -> bool:
-    text = cell.strip().strip('"').replace(decimal, ".")
+def _number(cell: str) -> bool:
     try:
-        float(text)
+        float(cell.replace(",", "."))
     except ValueError:
-        return text.lower() not in _MISSING
-    return False
+        return False
+    return cell.strip().lower().strip("+-") not in ("nan", "inf", "infinity")
+
+
+def _blank(cell: str) -> bool:
+    return cell.strip().lower() in _MISSING
+
+
+def _clock(cell: str) -> bool:
+    return bool(re.match(r"\d+[-:./]\d+", cell.strip()))
+
+
+def _word(values: Any) -> str:
+    return next((str(x) for x in values.dropna() if not _number(str(x))), "")

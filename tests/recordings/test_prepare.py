@@ -71,7 +71,7 @@ def test_uneven_times_and_short_gaps_are_interpolated():
     assert made.step == pytest.approx(0.02, rel=0.02)
     assert made.u[:, 0] == pytest.approx(np.sin(made.t), abs=1e-6)
     assert made.u[:, 1] == pytest.approx(np.cos(made.t), abs=1e-6)
-    assert "uneven times, missing values" in made.notes[-1]
+    assert "uneven times: steps from" in made.notes[-1]
 
 
 def test_span_and_factors_are_applied():

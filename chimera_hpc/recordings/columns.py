@@ -1,0 +1,147 @@
+"""Columns that are no nodes, and nodes that are suspect: counters, clocks, dead channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.recordings.recording import Array, Recording
+
+_FEWEST = 4
+"""Samples below which nothing is said of a column's course."""
+_STILL = 0.02
+"""Standard deviation, in those of the median node, below which a node does not oscillate."""
+
+
+def listed(text: str, option: str) -> list[str]:
+    """Return the words of a list with commas, or of the file that is called so."""
+    with suppress(OSError, ValueError):  # too long for a name of a file, or no text
+        text = Path(text).read_text(encoding="utf-8") if Path(text).is_file() else text
+    words = [word.strip() for word in text.replace("\n", ",").split(",") if word.strip()]
+    if not words:
+        raise BadInput(f"{option}: no node is named")
+    return words
+
+
+def places(names: Sequence[str], words: Iterable[str], option: str) -> list[int]:
+    """Return the columns of these words: names if all of them are, else numbers from 0."""
+    asked = list(words)
+    if len(asked) == 1 and asked[0] not in names:
+        asked = asked[0].split()
+    spread = [part for word in asked for part in word.split()]
+    for some in (asked, spread):
+        if all(word in names for word in some):
+            found = [names.index(word) for word in some]
+            break
+        if all(word.isdecimal() and int(word) < len(names) for word in some):
+            found = [int(word) for word in some]
+            break
+    else:
+        numbers = any(word.isdecimal() and int(word) < len(names) for word in spread)
+        wrong = next(word for word in spread if word not in names
+                     and (not numbers or any(w in names for w in spread)
+                          or not word.isdecimal() or int(word) >= len(names)))  # fmt: skip
+        raise BadInput(
+            f"{option}: {wrong} is no node; there are {len(names)}: {names[0]} to {names[-1]}"
+        )
+    if len(set(found)) < len(found):
+        raise BadInput(f"{option}: {_twice(found, names)} is there twice")
+    return found
+
+
+def _twice(found: list[int], names: Sequence[str]) -> str:
+    return names[next(i for i in found if found.count(i) > 1)]
+
+
+def without(recording: Recording, words: Sequence[str]) -> Recording:
+    """Leave nodes out, by name or number from 0."""
+    if not words:
+        return recording
+    return _but(recording, places(recording.names, words, "--drop"), "left out (--drop)")
+
+
+def _but(recording: Recording, left: Sequence[int], why: str) -> Recording:
+    kept = [i for i in range(len(recording.names)) if i not in left]
+    if not kept:
+        raise BadInput("no node is left")
+    names = tuple(recording.names[i] for i in kept)
+    note = f"{some_of([recording.names[i] for i in left])}: {why}"
+    return replace(recording, u=recording.u[:, kept], names=names, notes=(*recording.notes, note))
+
+
+def screened(recording: Recording, step: float | None) -> Recording:
+    """Take counters of samples, and columns that go with the times, out of the nodes.
+
+    BadInput where there are no times and a column rises as evenly as times do.
+    """
+    t, u = recording.t, recording.u
+    if len(u) < _FEWEST:
+        return recording
+    counters = [i for i in range(u.shape[1]) if is_counter(u[:, i])]
+    clocks = [i for i in range(u.shape[1]) if i not in counters and _goes_with(u[:, i], t)]
+    if t is None and clocks:
+        name = recording.names[clocks[0]]
+        raise BadInput(f"column {name} rises as evenly as times do: --time {name} takes it for the "
+                       f"times, --drop {name} leaves it out")  # fmt: skip
+    if t is None and counters and step is not None:
+        count = u[:, counters[0]]
+        if (np.diff(count) > 0.0).all():  # where it leaps, samples are missing
+            recording = replace(recording, t=step * (count - count[0]))
+    left = [*counters, *clocks]
+    if left:
+        recording = _but(recording, left, "counts samples or times, not taken for a node")
+    return recording
+
+
+def is_counter(values: Any) -> bool:
+    """Whether whole numbers rise by 1, but for some leaps: an index, a counter of samples."""
+    if not isinstance(values, np.ndarray) or len(values) < 2 or not np.isfinite(values).all():
+        return False
+    return bool((values % 1 == 0).all() and np.mean(np.diff(values) == 1.0) > 0.8)
+
+
+def _goes_with(values: Array, t: Array | None) -> bool:
+    """Whether a column rises in proportion to the times, or evenly where there are none."""
+    if not np.isfinite(values).all() or not (np.diff(values) > 0.0).all():
+        return False
+    t = np.arange(len(values), dtype=np.float64) if t is None else t
+    scaled = (values - values[0]) / (values[-1] - values[0])
+    wanted = (t - t[0]) / (t[-1] - t[0])
+    return bool(np.abs(scaled - wanted).max() * (len(t) - 1) < 0.6)
+
+
+def suspects(u: Array, names: Sequence[str]) -> list[str]:
+    """Return a line for each kind of node that seems to be none: still, rising, doubled."""
+    lines = []
+    spread = np.nanstd(u, axis=0)
+    still = np.flatnonzero(spread <= _STILL * float(np.median(spread))).tolist()
+    if 0 < len(still) < u.shape[1]:
+        lines.append(_drop([names[i] for i in still], "hardly varies beside the others"))
+    steps = np.diff(u, axis=0)
+    one_way = ((steps >= 0.0) | np.isnan(steps)).all(0) | ((steps <= 0.0) | np.isnan(steps)).all(0)
+    rising = np.flatnonzero(one_way & (spread > 0.0)).tolist()
+    if len(rising) and len(u) >= _FEWEST:
+        lines.append(_drop([names[i] for i in rising], "rises or falls throughout"))
+    first: dict[bytes, int] = {}
+    same = [i for i in range(u.shape[1]) if first.setdefault(u[:, i].tobytes(), i) != i]
+    same = [i for i in same if spread[i] > 0.0]
+    if same:
+        lines.append(_drop([names[i] for i in same], "has the same values as another node"))
+    return lines
+
+
+def _drop(names: list[str], what: str) -> str:
+    who = some_of(names)
+    return f"{who}: {what}; --drop {','.join(names[:5])} leaves it out"
+
+
+def some_of(names: Sequence[str]) -> str:
+    """Return the first five names, with commas."""
+    many = "node" if len(names) == 1 else "nodes"
+    return f"{many} {', '.join(names[:5])}" + (", ..." if len(names) > 5 else "")

@@ -1,0 +1,125 @@
+"""Tables of the same eight signals in the forms that people's files have: the truth comes out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.job.tables import Features
+from chimera_hpc.recordings.judge import Measured, measure
+from chimera_hpc.recordings.prepare import in_order, prepare, with_times
+from chimera_hpc.recordings.read import read_recording
+from chimera_hpc.recordings.recording import Choice, Recording
+
+T = 0.02 * np.arange(1501)
+U = np.cos(2 * np.pi * T[:, None] + np.pi / 4 * np.arange(8))
+NAMES = [f"ch{i}" for i in range(8)]
+TIMES = [f"{t:.2f}" for t in T]
+
+
+def table(times: list[str], names: list[str], sep: str = ",", comma: bool = False) -> str:
+    def cell(x: float) -> str:
+        return f"{x:.6f}".replace(".", ",") if comma else f"{x:.6f}"
+
+    rows = [sep.join([*([t] if t else []), *map(cell, u)]) for t, u in zip(times, U, strict=True)]
+    return "\n".join([sep.join(names), *rows]) + "\n"
+
+
+def measured(path: Path, step: float | None = None, **choice: object) -> Measured:
+    recording = with_times(read_recording(path, Choice(**choice)), step)
+    return measure(prepare(recording, None), Features(), True, None)
+
+
+def clock(t: float) -> str:
+    return f"{int(t) // 60:02d}:{t % 60:05.2f}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        table(TIMES, ["time", *NAMES]),
+        table(TIMES, ["time_s", *NAMES]),
+        table(TIMES, ["Zeit", *NAMES]),
+        table(TIMES, ["t [s]", *NAMES]),
+        table([f"{i},{t}" for i, t in enumerate(TIMES)], ["", "time", *NAMES]),
+        table([t.replace(".", ",") for t in TIMES], ["time", *NAMES], "\t", comma=True),
+        table([t.replace(".", ",") for t in TIMES], ["time", *NAMES], ";", comma=True),
+        table([t.replace(".", ",") for t in TIMES], ["time", *NAMES], " ", comma=True),
+        table(TIMES, ["time", *NAMES]).replace("\n", "\n" + ",".join("s" + "V" * 8) + "\n", 1),
+        table([clock(t) for t in T], ["time", *NAMES]),
+        table([f"01.02.2023 00:{clock(t)}" for t in T], ["time", *NAMES]),
+        table([f"2023-02-01T00:{clock(t)}+02:00" for t in T], ["time", *NAMES]),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
+def test_the_truth_comes_out_whatever_the_form(text: str, encoding: str, tmp_path: Path):
+    (tmp_path / "u.csv").write_text(text, encoding=encoding)
+    found = measured(tmp_path / "u.csv").features
+    assert found.frequency == pytest.approx(np.ones(8), rel=0.01)
+    assert found.amplitude == pytest.approx(np.ones(8), rel=0.01)
+
+
+def test_dotted_dates_have_the_day_first(tmp_path: Path):
+    days = np.datetime64("2023-02-01") + np.arange(1501) * np.timedelta64(10, "m")
+    words = [f"{s[8:10]}.{s[5:7]}.{s[:4]} {s[11:16]}" for s in map(str, days)]
+    (tmp_path / "u.csv").write_text(table(words, ["time", *NAMES]))
+    found = read_recording(tmp_path / "u.csv", Choice())
+    assert found.t == pytest.approx(600.0 * np.arange(1501))
+
+
+def test_microvolts_are_not_steady(tmp_path: Path):
+    np.savez(tmp_path / "u.npz", t=T, u=1e-6 * U)
+    assert measured(tmp_path / "u.npz").features.amplitude == pytest.approx(
+        np.full(8, 1e-6), rel=0.01
+    )
+
+
+def test_times_of_the_file_and_a_step_exclude_each_other(tmp_path: Path):
+    (tmp_path / "u.csv").write_text(table(TIMES, ["time_s", *NAMES]))
+    with pytest.raises(BadInput, match="leave --step out, or --drop time_s"):
+        measured(tmp_path / "u.csv", 0.02, no_times=True)
+    left = measured(tmp_path / "u.csv", 0.02, no_times=True, drop=("time_s",))
+    assert len(left.features.frequency) == 8
+
+
+def test_dead_channel_is_named(tmp_path: Path):
+    u = U.copy()
+    u[:, 3] = 0.0
+    np.savez(tmp_path / "u.npz", t=T, u=u)
+    made = prepare(with_times(read_recording(tmp_path / "u.npz", Choice()), None), None)
+    assert any("node 3: hardly varies" in line and "--drop 3" in line for line in made.warnings)
+
+
+def test_rows_of_nodes_are_refused_until_turned(tmp_path: Path):
+    np.save(tmp_path / "u.npy", U.T)
+    with pytest.raises(BadInput, match="--transpose turns them"):
+        measured(tmp_path / "u.npy", 0.02)
+    assert len(measured(tmp_path / "u.npy", 0.02, transpose=True).features.frequency) == 8
+
+
+def test_order_is_by_names_or_by_numbers_never_both():
+    recording = Recording(T, U, tuple("12345678"))
+    assert in_order(recording, "0,3,5").names == ("1", "4", "6")
+    assert in_order(recording, "1,2,3").names == ("1", "2", "3")
+    many = Recording(T[:3], np.ones((3, 2000)))
+    assert in_order(many, ",".join(map(str, range(2000)))).names == many.names
+
+
+def test_steps_of_a_solver_are_resampled_and_no_gaps(tmp_path: Path):
+    steps = np.repeat([0.002, 0.05, 0.002, 0.05], [2000, 300, 2000, 300])
+    t = np.cumsum(steps)
+    u = np.cos(2 * np.pi * t[:, None] + np.pi / 4 * np.arange(8))
+    made = prepare(Recording(t, u), None)
+    assert made.gaps == ()
+    assert made.t[-1] == pytest.approx(t[-1], abs=0.01)
+    assert any("uneven times" in note for note in made.notes)
+
+
+def test_cell_with_a_hash_is_missing_and_cuts_nothing(tmp_path: Path):
+    text = table(TIMES, ["time", *NAMES]).splitlines()
+    text[700] = ",".join([TIMES[699], "#N/A", *text[700].split(",")[2:]])
+    (tmp_path / "u.csv").write_text("\n".join(text))
+    assert np.isnan(read_recording(tmp_path / "u.csv", Choice()).u).sum() == 1
