@@ -24,8 +24,8 @@ ATLAS = Atlas(
         (1.0, "ordered", 0.0, 1.0, 0.7, "among"),
         (0.5, "ordered", 0.05, 1.0, 0.75, "among"),
         (3.5, "ordered", 0.15, 0.4, 0.45, "among"),
-        (-4.0, "ordered", 0.4, 0.0, 1.2, "nearest to this class by far"),
-        (5.4, "chimera", 0.26, 0.0, 0.34, "little to say"),
+        (-4.0, "ordered", 0.4, 0.0, 1.2, "outside"),
+        (5.4, "chimera", 0.26, 0.0, 0.34, "outside"),
     ],
 )
 def test_confidence_compares_with_the_spacing_of_the_atlas(

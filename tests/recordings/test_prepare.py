@@ -109,9 +109,7 @@ def test_step_is_needed_where_there_are_no_times_and_only_there():
 def test_node_without_values_is_named():
     u = np.ones((10, 3))
     u[:, 1] = NAN
-    with pytest.raises(
-        BadInput, match="more than half of the values of node 1 is missing; --order"
-    ):
+    with pytest.raises(BadInput, match="more than half of the values of node 1 is missing; --drop"):
         prepare(Recording(np.arange(10.0), u), None)
 
 

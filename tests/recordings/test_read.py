@@ -96,7 +96,7 @@ def test_holes_in_a_table_are_missing_values(tmp_path: Path):
 def test_column_of_times_can_be_named_or_denied(tmp_path: Path):
     (tmp_path / "u.csv").write_text("a,clock,b\n1,0,2\n3,1,4\n")
     assert read(tmp_path / "u.csv", time="clock").names == ("a", "b")
-    (tmp_path / "v.csv").write_text("1,7\n2,5\n3,6\n")
+    (tmp_path / "v.csv").write_text("1.5,7\n2,5\n2.5,6\n")
     assert read(tmp_path / "v.csv").u.shape == (3, 1)
     with pytest.raises(BadInput, match="column 0 holds times: leave --step out, or --drop 0"):
         read(tmp_path / "v.csv", no_times=True)
