@@ -127,7 +127,7 @@ class Slurm:
                 raise RuntimeError(f"{what} within {seconds} s; logs in {self.dir}")
             for daemon in self.daemons:
                 if daemon.poll() is not None:
-                    raise RuntimeError(f"{daemon.args} ended; logs in {self.dir}")
+                    raise RuntimeError(f"{daemon.args!r} ended; logs in {self.dir}")
             time.sleep(0.05)
 
     def idle_nodes(self) -> int:

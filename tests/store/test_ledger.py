@@ -20,6 +20,7 @@ import zarr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from store_tools import fill, make_store
+from zarr.abc.buffer import Buffer
 from zarr.codecs import Crc32cCodec
 from zarr.storage import MemoryStore
 
@@ -139,7 +140,7 @@ def test_reading_the_ledger_does_not_import_zarr(store: Store) -> None:
 
 @given(st.binary(max_size=200))
 def test_seal_writes_what_zarrs_codec_writes(data: bytes) -> None:
-    files: dict[str, zarr.abc.buffer.Buffer] = {}
+    files: dict[str, Buffer] = {}
     array = zarr.create_array(
         MemoryStore(files), shape=(len(data) + 1,), dtype="u1", compressors=[Crc32cCodec()]
     )
