@@ -16,9 +16,9 @@ import pytest
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.run import driver as driving
 from chimera_hpc.run import work
 from chimera_hpc.run.block import run_block
+from chimera_hpc.run.choice import ExecutorChoice
 from chimera_hpc.run.executors import ClusterLost
 from chimera_hpc.store.block_result import BlockResult, failed_block
 from chimera_hpc.store.ledger import read_ledger
@@ -322,14 +322,16 @@ def test_cluster_that_is_lost_is_started_again_and_in_the_end_given_up(
     started = []
 
     @contextmanager
-    def cluster(driver: driving.Driver, patience: float) -> Iterator[None]:
+    def cluster(
+        choice: ExecutorChoice, store: Path, n_blocks: int, say: Any, patience: float, *_: Any
+    ) -> Iterator[tuple[None, Any]]:
         started.append(patience)
-        yield None
+        yield None, bool
 
     def lost(*_: Any) -> None:
         raise ClusterLost("the scheduler is gone")
 
-    monkeypatch.setattr(driving.Driver, "_cluster", cluster)
+    monkeypatch.setattr(ExecutorChoice, "cluster", cluster)
     monkeypatch.setattr("chimera_hpc.run.executors.run_dask", lost)
     code, out, err = sweep("run", job, "--out", tmp_path / "out", "--no-figures")
     assert code == 75

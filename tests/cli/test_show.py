@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from chimera_hpc.cli import show
+from chimera_hpc.measures import variation
 from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.plot import animation
 from chimera_hpc.plot.spectrum import vertex
@@ -61,10 +62,8 @@ def test_replayed_signals_are_those_of_the_store(store: Store):
 def test_other_bits_than_stored_are_said_with_status_one(
     finished: Path, store: Store, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
 ):
-    from chimera_hpc.run import block as task
-
-    true = task.total_variations
-    monkeypatch.setattr(task, "total_variations", lambda f: [1.0 + x for x in true(f)])
+    true = variation.total_variations
+    monkeypatch.setattr(variation, "total_variations", lambda f: [1.0 + x for x in true(f)])
     code, out, _ = sweep("show", finished, *words(store, oscillating(store)))
     assert code == 1
     assert "NOT the same" in out
