@@ -62,3 +62,9 @@ def integer(name: str, value: int) -> int:
         return operator.index(value)
     except TypeError as error:
         raise BadInput(f"{name} must be a whole number, not {value!r}") from error
+
+
+def choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    """Raise BadInput unless the value is one of the allowed words."""
+    if value not in allowed:
+        raise BadInput(f"{name} must be one of {', '.join(allowed)}, not {value!r}")

@@ -27,7 +27,7 @@ from chimera_hpc.base.renaming import accepts_old_names
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
-from chimera_hpc.measures.checks import Array, floats, integer, node_rows
+from chimera_hpc.measures.checks import Array, choice, floats, integer, node_rows
 
 WindowReference = Literal["ring", "own"]
 PhaseMean = Literal["circular", "arithmetic"]
@@ -174,7 +174,7 @@ def fourier_features(
     >>> f.n_windows, f.status.name
     (3, 'DONE')
     """
-    _check_choice("phase_mean", phase_mean, get_args(PhaseMean))
+    choice("phase_mean", phase_mean, get_args(PhaseMean))
     found = window_lines(
         t,
         u,
@@ -216,9 +216,9 @@ def window_lines(
     n_nodes = recording.x.shape[0]
     n_peaks, n_overlap = _check_windows(n_peaks, n_overlap)
     reference_node = _check_node(reference_node, n_nodes)
-    _check_choice("window_reference", window_reference, get_args(WindowReference))
-    _check_choice("refine", refine, get_args(Refine))
-    _check_choice("time_origin", time_origin, get_args(TimeOrigin))
+    choice("window_reference", window_reference, get_args(WindowReference))
+    choice("refine", refine, get_args(Refine))
+    choice("time_origin", time_origin, get_args(TimeOrigin))
     _check_threshold(steady_threshold)
 
     deviation = _mean_deviation(recording.x)
@@ -388,11 +388,6 @@ def _check_node(reference_node: int, n_nodes: int) -> int:
     if not 0 <= reference_node < n_nodes:
         raise BadInput(f"reference_node must be in 0 .. {n_nodes - 1}, not {reference_node}")
     return reference_node
-
-
-def _check_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise BadInput(f"{name} must be one of {', '.join(allowed)}, not {value!r}")
 
 
 def _check_threshold(threshold: float) -> None:

@@ -66,7 +66,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Judge:
+class Labeller:
     """The frozen classes that label runs."""
 
     name: str
@@ -75,7 +75,7 @@ class Judge:
     """None: runs are told apart by whether they end inside the ball that they began in."""
 
     @classmethod
-    def of(cls, store: Store, own: Atlas, others: Mapping[str, Atlas]) -> Judge:
+    def of(cls, store: Store, own: Atlas, others: Mapping[str, Atlas]) -> Labeller:
         """Return the judge of a sweep.
 
         The first atlas that the job names, else the sweep's own; none where it maps a basin.
@@ -107,7 +107,7 @@ class Basis:
     ledger: Mapping[str, Integers]
     cuts: Mapping[int, tuple[Integers, Sequence[str]]]
     """For each cut the label of each point (-1: none), and the names of its classes."""
-    judge: Judge
+    judge: Labeller
     labels: Labels
 
     @property
@@ -219,7 +219,7 @@ def _standing(folder: Path, results: Mapping[str, Any]) -> tuple[Basis, Runs]:
         for k in stored.attributes["cuts"]
     }
     own = Atlas.from_arrays(stored.arrays, stored.attributes)
-    judge = Judge.of(store, own, _other_atlas(stored))
+    judge = Labeller.of(store, own, _other_atlas(stored))
     triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
     runs = Runs(ledger["status"], triplets, scalars["distance"], ledger["steps"])
     return basis_of(store, ledger, runs, cuts, judge), runs
@@ -230,7 +230,7 @@ def basis_of(
     ledger: Mapping[str, Integers],
     runs: Runs,
     cuts: Mapping[int, tuple[Integers, Sequence[str]]],
-    judge: Judge,
+    judge: Labeller,
 ) -> Basis:
     """Label all points of a store."""
     radius = store.points.columns["delta"].astype(np.float64)

@@ -17,7 +17,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.modes import run_names
-from chimera_hpc.reduction.audit import Basis, Judge, basis_of, kept_audit
+from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import Runs
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.record import reduction_variables
@@ -156,7 +156,7 @@ class _Work:
     def _basis(self) -> Basis:
         """What an audit of these classes stands on."""
         cuts = {k: (cut.labels, cut.names) for k, cut in self.classification.cuts.items()}
-        judge = Judge.of(self.store, Atlas.of(self.classification), self.atlases)
+        judge = Labeller.of(self.store, Atlas.of(self.classification), self.atlases)
         runs = Runs(self.status, self.triplets, self.scalars["distance"], self.ledger["steps"])
         return basis_of(self.store, self.ledger, runs, cuts, judge)
 
