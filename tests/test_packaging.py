@@ -39,6 +39,13 @@ LAYERS = (
     "cli",
 )
 PRINTING = ("cli", "run.progress")
+SCOREBOARD = sorted((ROOT / "jobs" / "paper" / "scoreboard").rglob("*.py"))
+PRIVATE = re.compile(r"_[a-zA-Z]\w*")
+OPTION = re.compile(r"_[a-z]\w*")
+NAMED_TUPLE = {"_asdict", "_fields", "_field_defaults", "_make", "_replace"}
+"""Underscored by collections.namedtuple so that no field hides them; documented as public."""
+PRIVATE_OPTIONS = {"_nrt": "numba's option, a keyword and no name; without it 1.6 times slower"}
+MOST_PARAMETERS, MOST_LINES = 8, 400
 
 
 def modules_loaded_by(statement: str) -> set[str]:
@@ -195,6 +202,93 @@ def test_only_the_command_line_prints():
         and node.func.id == "print"
     ]
     assert printing == []
+
+
+def trees(sources: list[Path]) -> list[tuple[Path, ast.Module]]:
+    return [(source, ast.parse(source.read_text(encoding="utf-8"))) for source in sources]
+
+
+def members(tree: ast.AST) -> Iterator[str]:
+    """Names that the classes of a file give their objects."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef):
+            for part in node.body:
+                targets = part.targets if isinstance(part, ast.Assign) else []
+                targets = [part.target] if isinstance(part, ast.AnnAssign) else targets
+                yield from (target.id for target in targets if isinstance(target, ast.Name))
+                if isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef):
+                    yield part.name
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and is_own(node):
+            yield node.attr
+
+
+def is_own(node: ast.Attribute) -> bool:
+    return isinstance(node.value, ast.Name) and node.value.id in {"self", "cls"}
+
+
+def imported_from_elsewhere(node: ast.AST) -> list[str]:
+    """Every part of the dotted names that a statement imports from other packages."""
+    if isinstance(node, ast.Import):
+        names = [alias.name for alias in node.names]
+    elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        names = [f"{node.module}.{alias.name}" for alias in node.names]
+    else:
+        names = []
+    ours = ("chimera_hpc.", "scoreboard.")
+    return [part for name in names if not name.startswith(ours) for part in name.split(".")]
+
+
+def private_names(tree: ast.AST, own: set[str]) -> Iterator[tuple[int, str]]:
+    """Private names of other packages that a file uses, each with its line."""
+    aliases = {
+        (alias.asname or alias.name).partition(".")[0]
+        for node in ast.walk(tree)
+        if imported_from_elsewhere(node)
+        for alias in node.names
+    }
+    for node in ast.walk(tree):
+        names = imported_from_elsewhere(node)
+        if isinstance(node, ast.Attribute) and not is_own(node):
+            root = node.value
+            while isinstance(root, ast.Attribute):
+                root = root.value
+            foreign = isinstance(root, ast.Name) and root.id in aliases
+            names = [node.attr] if foreign or node.attr not in own else []
+        yield from ((node.lineno, name) for name in names if PRIVATE.fullmatch(name))
+
+
+def test_no_private_name_of_another_package():
+    files = trees(SOURCES + SCOREBOARD)
+    own = NAMED_TUPLE.union(*(members(tree) for _, tree in files))
+    found = [
+        f"{source.relative_to(ROOT)}:{line}: {name}"
+        for source, tree in files
+        for line, name in private_names(tree, own)
+    ]
+    assert found == []
+
+
+def test_private_options_of_other_packages_are_those_that_are_listed():
+    found = set()
+    for _, tree in trees(SOURCES + SCOREBOARD):
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Dict):
+                found |= {key.value for key in node.keys if isinstance(key, ast.Constant)}
+            elif isinstance(node, ast.Call):
+                found |= {word.arg for word in node.keywords}
+    options = {name for name in found if isinstance(name, str) and OPTION.fullmatch(name)}
+    assert options == set(PRIVATE_OPTIONS)
+
+
+def test_no_function_takes_many_positional_parameters():
+    found = []
+    for source, tree in trees(SOURCES):
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+                names = [arg.arg for arg in node.args.posonlyargs + node.args.args]
+                if len(names) - (names[:1] in (["self"], ["cls"])) > MOST_PARAMETERS:
+                    found.append(f"{source.relative_to(ROOT)}:{node.lineno}")
+    assert found == []
 
 
 def project_files() -> list[Path]:

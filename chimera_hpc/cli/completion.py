@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, Namespace
-from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
@@ -33,19 +33,19 @@ def execute(args: Namespace) -> int:
         raise BadInput(
             "completion: shtab is missing; pip install 'chimera_hpc[completion]' brings it"
         ) from None
-    top = args.parser_named(PROGRAM)
-    for action in _actions(top):
-        files = {Path: shtab.FILE, job_file: shtab.FILE}.get(action.type)  # type: ignore[arg-type]
-        if files is not None:
-            action.complete = shtab.DIR if action.metavar == "DIR" else files  # type: ignore[attr-defined]
-    print(shtab.complete(top, args.shell))
+    print(shtab.complete(args.parser_named(PROGRAM, kind=_Parser), args.shell))
     return Exit.COMPLETE
 
 
-def _actions(parser: ArgumentParser) -> Iterator[Action]:
-    """Yield every argument of the parser and of its commands."""
-    for action in parser._actions:
-        yield action
-        if isinstance(action.choices, dict):
-            for command in action.choices.values():
-                yield from _actions(command)
+class _Parser(ArgumentParser):
+    """A parser that tells shtab which of its arguments are files and folders."""
+
+    def add_argument(self, *names: Any, **options: Any) -> Action:
+        """Declare an argument. Those of a group do not pass here; none of them is a file."""
+        import shtab
+
+        action = super().add_argument(*names, **options)
+        if action.type in (Path, job_file):
+            files = shtab.DIR if action.metavar == "DIR" else shtab.FILE
+            action.complete = files  # type: ignore[attr-defined]
+        return action

@@ -23,16 +23,19 @@ _INTERRUPTED = 130
 
 
 def parser(
-    program: str = "python -m chimera_hpc.sweep", typed: Sequence[str] | None = None
+    program: str = "python -m chimera_hpc.sweep",
+    typed: Sequence[str] | None = None,
+    kind: type[ArgumentParser] = ArgumentParser,
 ) -> ArgumentParser:
     """Return the parser of the whole command line, called by this name.
 
-    It knows the arguments of all commands, or where `typed` is given only of those that are named
-    in it: the others need not be loaded then.
+    It and the parsers of the commands are of the class `kind`. It knows the arguments of all
+    commands, or where `typed` is given only of those that are named in it: the others need not be
+    loaded then.
     """
     from chimera_hpc.cli import COMMANDS
 
-    top = ArgumentParser(
+    top = kind(
         prog=program,
         description="Parameter sweeps of oscillator networks: integrate, store, classify, draw.",
         epilog="Each command has its own --help with examples.\n\n" + _EXITS,
