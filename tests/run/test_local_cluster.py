@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import dask
+import psutil
 import pytest
 from dask.utils import parse_timedelta
 
@@ -50,6 +52,23 @@ def test_cluster_that_does_not_close_is_left_behind_without_workers(
         assert worker.wait(timeout=30) == -signal.SIGKILL
     assert stuck.limits == [cluster._CLOSE_SECONDS]
     assert stuck.nanny.auto_restart is False
+
+
+def test_nothing_listens_beyond_loopback() -> None:
+    with local_cluster(1) as client:
+        (worker,) = client.run(os.getpid).values()
+        tree = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        listening = {process.pid: _listening(process) for process in tree}
+    # Scheduler and nanny live in this process; each process also has the server of its dashboard.
+    assert len(listening[os.getpid()]) >= 3
+    assert len(listening[worker]) >= 2
+    hosts = {host for found in listening.values() for host in found}
+    assert hosts <= {"127.0.0.1", "::1"}
+
+
+def _listening(process: psutil.Process) -> list[str]:
+    found = process.net_connections(kind="inet")
+    return [one.laddr.ip for one in found if one.status == psutil.CONN_LISTEN]
 
 
 def test_workers_load_no_dashboard_and_are_not_profiled() -> None:

@@ -157,6 +157,20 @@ def test_error_in_a_model_is_named_and_the_other_points_are_done(
     assert do_block(message(store), 0).n_done == 1
 
 
+def test_ctrl_c_in_the_middle_of_a_block_hands_its_claim_back(store: Store, compute: Any) -> None:
+    def interrupted(sweep: Sweep, points: Points, _: Any) -> BlockResult:
+        raise KeyboardInterrupt
+
+    compute(interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        do_block(message(store), 0)
+    assert not work.is_busy()
+    # This process lives on: without its word the claim would stay alive.
+    claim = claim_block(store.path, 0, RUN)
+    assert claim is not None
+    assert [lost.handed_back for lost in claim.lost] == [True]
+
+
 def test_error_of_the_system_is_told_and_the_block_handed_back(
     store: Store, compute: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
