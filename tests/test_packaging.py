@@ -291,6 +291,11 @@ def test_no_function_takes_many_positional_parameters():
     assert found == []
 
 
+def test_no_file_is_long():
+    lines = {source: len(source.read_text("utf-8").splitlines()) for source in SOURCES}
+    assert [str(s.relative_to(ROOT)) for s, n in lines.items() if n > MOST_LINES] == []
+
+
 def project_files() -> list[Path]:
     """Files that git tracks or would add."""
     listed = subprocess.run(
