@@ -121,6 +121,22 @@ def test_other_sampling_is_brought_to_the_step_of_the_atlas(
     assert any("samples a period" in warning for warning in found["warnings"])
 
 
+def test_recording_outside_the_atlas_has_no_class_but_a_nearest(
+    recorded: tuple[Path, Store, int], sweep: Sweep
+):
+    folder, store, i = recorded
+    np.savez("far.npz", t=sample_times(store.sweep), u=1000.0 * store.series(i))
+    found = as_json(sweep, "far.npz", "--atlas", folder)
+    assert (found["status"], found["class"], found["confidence"]) == ("done", None, 0.0)
+    assert found["nearest"] in {"ordered", "chimera", "disordered"}
+    code, out, _ = sweep("classify", "far.npz", "--atlas", folder, "--no-figures")
+    assert code == 0
+    assert f"class: none, by {folder}\n" in out
+    assert f"the nearest class is {found['nearest']}\n" in out
+    inside = as_json(sweep, folder, "--select", f"point={i}", "--atlas", folder)
+    assert inside["class"] == inside["nearest"]
+
+
 def test_rescaling_takes_other_units_back(recorded: tuple[Path, Store, int], sweep: Sweep):
     folder, store, i = recorded
     t, u = sample_times(store.sweep), store.series(i)
@@ -195,6 +211,17 @@ def test_figures_are_written_where_they_are_wanted(
     assert made == {"space_time.png", "profiles.png", "spectrum.png", "atlas.png"}
     assert f"written: {tmp_path / 'made' / 'atlas.png'}" in out
     assert f"by {folder}" in out
+
+
+def test_dollars_in_names_are_drawn_and_begin_no_formula(sweep: Sweep):
+    t, u = ring(n=3)
+    names = ["$\\frac$", "cost $", "a$b$"]
+    table = [",".join(["time", *names])]
+    table += [",".join(f"{x:.6f}" for x in (s, *row)) for s, row in zip(t, u, strict=True)]
+    Path("$\\x$.csv").write_text("\n".join(table))
+    code, _, error = sweep("classify", "$\\x$.csv", "--out", "made")
+    assert (code, error) == (0, "")
+    assert len(list(Path("made").glob("*.png"))) == 3
 
 
 def test_recording_that_stands_still_is_steady(sweep: Sweep):

@@ -52,6 +52,10 @@ def broken(array, index, value):
         (T, broken(U, (5, 2), 1e200), {}, "u must be finite, its squares too: node 2"),
         (T, [["x"] * 3] * 2001, {}, "u must be an array of real numbers"),
         (T, [[1.0], [2.0, 3.0]], {}, "u must be an array of real numbers"),
+        (T, U + 0j, {}, "u must be an array of real numbers"),
+        (T + 0j, U, {}, "t must be an array of real numbers"),
+        (T, np.ma.masked_greater(U, 0.9), {}, "u holds masked values"),
+        (np.ma.masked_less(T, 1.0), U, {}, "t holds masked values"),
     ],
 )
 def test_bad_input_is_named(t, u, options, message):
@@ -63,3 +67,8 @@ def test_bad_input_is_named(t, u, options, message):
 def test_times_off_by_less_than_a_hundredth_of_a_step_are_uniform():
     rounded = T + 0.4e-4 * np.random.default_rng(0).uniform(-1, 1, T.size)
     assert fourier_features(rounded, U).n_windows > 0
+
+
+def test_masked_array_without_a_masked_value_is_an_array():
+    found = fourier_features(T, np.ma.masked_greater(U, 2.0))
+    assert found.as_array().tobytes() == fourier_features(T, U).as_array().tobytes()

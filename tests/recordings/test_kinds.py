@@ -93,6 +93,14 @@ def test_dead_channel_is_named(tmp_path: Path):
     assert any("node 3: hardly varies" in line and "--drop 3" in line for line in made.warnings)
 
 
+def test_node_with_the_values_of_another_is_named():
+    u = U.copy()
+    u[:, 5] = u[:, 2]
+    made = prepare(Recording(T, u), None)
+    wanted = "node 5: has the same values as another node; --drop 5 leaves it out"
+    assert made.warnings == (wanted,)
+
+
 def test_rows_of_nodes_are_refused_until_turned(tmp_path: Path):
     np.save(tmp_path / "u.npy", U.T)
     with pytest.raises(BadInput, match="--transpose turns them"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import pickle
 from pathlib import Path
 
@@ -182,3 +183,53 @@ def test_arrays_of_other_shapes_and_types_are_refused(values: np.ndarray, tmp_pa
     np.save(tmp_path / "u.npy", values)
     with pytest.raises(BadInput, match=r"is needed|are not real numbers"):
         read(tmp_path / "u.npy")
+
+
+def test_matlab_file_is_read_by_the_names_of_its_arrays(tmp_path: Path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "u.mat", {"signal": U.T, "time": T[:, None], "gain": 2.0, "note": "by hand"})
+    found = read(tmp_path / "u.mat")
+    assert found.u.tolist() == U.tolist()
+    assert found.t is not None
+    assert found.t.tolist() == T.tolist()
+    assert "signals: array signal" in found.notes
+
+
+def test_compressed_table_is_the_table(tmp_path: Path):
+    (tmp_path / "u.csv.gz").write_bytes(gzip.compress(b"time,a,b\n0,1,2\n0.5,3,4\n1,5,6\n"))
+    found = read(tmp_path / "u.csv.gz")
+    assert found.u.tolist() == [[1, 2], [3, 4], [5, 6]]
+    assert found.names == ("a", "b")
+    (tmp_path / "u.npy.gz").write_bytes(gzip.compress(b"rubbish"))
+    with pytest.raises(BadInput, match=r"tables with \.gz too"):
+        read(tmp_path / "u.npy.gz")
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds"),
+    [
+        # The last day of a month and the first of the next are a day apart, not 70 numbers.
+        (("20260131", "20260201", "20260202"), [0, 86400, 172800]),
+        (("20260131235959", "20260201000000", "20260201000001"), [0, 1, 2]),
+        # No month 13: these are numbers.
+        (("20261301", "20261302", "20261303"), [20261301, 20261302, 20261303]),
+    ],
+)
+def test_dates_in_one_number_become_seconds(
+    words: tuple[str, ...], seconds: list[float], tmp_path: Path
+):
+    rows = [f"{word},{i},{i * i}" for i, word in enumerate(words)]
+    (tmp_path / "u.csv").write_text("\n".join(["time,a,b", *rows]))
+    found = read(tmp_path / "u.csv")
+    assert found.t is not None
+    assert found.t.tolist() == seconds
+
+
+def test_second_column_of_one_name_gets_a_number(tmp_path: Path):
+    (tmp_path / "u.csv").write_text("time,ch,ch,b\n0,1,2,7\n1,3,4,5\n2,5,3,6\n")
+    found = read(tmp_path / "u.csv")
+    assert found.names == ("ch", "ch.1", "b")
+    assert found.u[:, 1].tolist() == [2, 4, 3]
+    assert "two columns are called ch: the later is ch.1" in found.notes
+    assert read(tmp_path / "u.csv", drop=("ch",)).names == ("ch.1", "b")
