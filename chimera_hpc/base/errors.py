@@ -1,4 +1,4 @@
-"""The one exception that users cause."""
+"""The exception for errors in a user's input."""
 
 
 class BadInput(ValueError):

@@ -4,15 +4,15 @@ from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """What a command's exit status says."""
+    """Meaning of a command's exit status."""
 
     COMPLETE = 0
     """Every point has a result."""
     FAILURES = 1
     """Some points failed; they are listed."""
     BAD_INPUT = 2
-    """One line says what, where and what is allowed."""
+    """Wrong input. One line says what, where and what is allowed."""
     MORE_TO_DO = 75
-    """Stopped in good order (SIGTERM, SIGUSR1, end of a job); the same command goes on."""
+    """Stopped in good order (SIGTERM, SIGUSR1, end of a job); the same command continues."""
     INTERRUPTED = 130
-    """Stopped by Ctrl-C; the same command goes on."""
+    """Stopped by Ctrl-C; the same command continues."""

@@ -1,8 +1,8 @@
-"""Files that are whole or absent, whatever dies in between.
+"""Files that are whole or absent, also after a crash.
 
-A file is written under a temporary name in its own folder, flushed to the disk, and renamed; the
-folder is flushed last. A reader therefore sees the old contents or the new ones, and after a loss
-of power a file that was written later never stands without the ones written before it.
+A file is written under a temporary name in its own folder, flushed to the disk, and renamed. The
+folder is flushed last. A reader therefore sees either the old contents or the new ones. After a
+power failure, a file exists only if all files written before it exist too.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from pathlib import Path
 from chimera_hpc.base.processes import is_gone, process_identity
 
 HOPELESS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
-"""Errors that the next write would run into as well."""
+"""Errors that the next write would also raise."""
 _SUFFIX = ".partial"
 LEFTOVER_AGE = 3600.0
-"""Seconds after which the temporary file of an unknown process counts as left over."""
+"""Age (s) at which a temporary file of an unknown process is treated as left over."""
 
 
 def temporary_name(path: Path) -> Path:
-    """Return a fresh name beside `path` that tells which process it belongs to."""
+    """Return a new name in the folder of `path` that contains the identity of this process."""
     return path.with_name(f".{path.name}.{process_identity()}.{uuid.uuid4().hex[:8]}{_SUFFIX}")
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Replace or create `path` with `data`; on return it is on the disk, name and contents."""
+    """Replace or create `path` with `data`. On return, name and contents are on the disk."""
     write_together([(path, data)])
 
 
 def write_together(contents: Sequence[tuple[Path, bytes]]) -> None:
-    """Write several files as `write_atomically` does, one after the other, but flush them together.
+    """Write several files in order, as `write_atomically` does, but flush them together.
 
-    On return all of them are on the disk; before, any first few of them may be.
+    On return, all of them are on the disk. After a crash, only the first few may be.
     """
     with contextlib.ExitStack() as stack:
         files = [stack.enter_context(_written(path, data)) for path, data in contents]
@@ -53,13 +53,13 @@ def write_together(contents: Sequence[tuple[Path, bytes]]) -> None:
 def create_exclusively(path: Path, data: bytes, *, durable: bool = True) -> bool:
     """Create `path` with `data` unless it exists; return whether this call created it.
 
-    Unless `durable`, it need not outlast a loss of power.
+    Unless `durable`, the file may be lost in a power failure.
 
-    The contents are linked into place whole, so that no reader ever finds the file empty; and a
-    link is made or refused by the file server itself, also on network file systems where an
-    exclusive open is not dependable. A server's answer may get lost and the repeated request be
-    refused although the first one succeeded: the number of links of the temporary file then tells
-    the truth. Where hard links are not offered the file is opened exclusively.
+    The complete contents are hard-linked into place, so a reader never finds the file empty. The
+    file server itself makes or refuses a link, also on network file systems where an exclusive
+    open is unreliable. If the server's answer is lost, the repeated request is refused although
+    the first one succeeded. The link count of the temporary file detects this case. Without hard
+    links, the file is opened exclusively.
     """
     with _written(path, data) as (temporary, _):
         if durable:
@@ -80,7 +80,7 @@ def create_exclusively(path: Path, data: bytes, *, durable: bool = True) -> bool
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk."""
+    """Flush the entries of a folder to the disk."""
     _flush(folder)
 
 
@@ -93,10 +93,10 @@ def sync_tree(folder: Path) -> None:
 
 
 def remove_leftovers(folder: Path) -> int:
-    """Delete what killed writers left in `folder` under temporary names; return how many went.
+    """Delete the temporary files and folders that killed writers left in `folder`.
 
-    A temporary file or folder is left over when its process is gone from this machine, or when it
-    has not changed for `LEFTOVER_AGE`.
+    A temporary file or folder is left over when its process ran on this machine and has ended, or
+    when it has not changed for `LEFTOVER_AGE`. Returns the number of deleted entries.
     """
     count = 0
     with contextlib.suppress(FileNotFoundError):
@@ -108,7 +108,7 @@ def remove_leftovers(folder: Path) -> int:
 
 
 def is_leftover(path: Path) -> bool:
-    """Whether a file or folder under a temporary name was abandoned by its writer."""
+    """Return whether the writer of a temporary file or folder has abandoned it."""
     mark = path.name.removesuffix(_SUFFIX).rpartition(".")[0].rpartition(".")[2]
     try:
         age = time.time() - path.stat().st_mtime
@@ -118,9 +118,9 @@ def is_leftover(path: Path) -> bool:
 
 
 def server_time(folder: Path) -> float:
-    """Return the present time by the clock that stamps the files of `folder` (s since 1970).
+    """Return the current time of the clock that stamps the files of `folder` (s since 1970).
 
-    Hosts that share a folder may disagree about the time; ages of files are compared with this
+    The clocks of hosts that share a folder may differ. The age of a file is measured with this
     clock.
     """
     probe = temporary_name(folder / "clock")
@@ -133,7 +133,7 @@ def server_time(folder: Path) -> float:
 
 @contextlib.contextmanager
 def _written(path: Path, data: bytes) -> Iterator[tuple[Path, Path]]:
-    """Yield a temporary file with the data and its final path; afterwards it is gone."""
+    """Yield a temporary file with the data and its final path. Delete the file on exit."""
     temporary = temporary_name(path)
     try:
         with temporary.open("xb") as file:

@@ -1,4 +1,4 @@
-"""This process: a mark by which others on the machine can tell that it is gone, and its cores."""
+"""The identity of this process, by which others can tell that it has ended, and its cores."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ _PROC = Path("/proc")
 
 
 def process_identity() -> str:
-    """Return ``machine-pid-start`` of this process, unique over reboots and reuse of numbers.
+    """Return ``machine-pid-start`` of this process, unique across reboots and reused process ids.
 
-    It may stand in a file name. `start` is the kernel's start time of the process in clock ticks
-    after boot, or 0 where the system does not tell (no ``/proc``).
+    The text is valid in a file name. `start` is the start time of the process in clock ticks after
+    boot, or 0 on a system without ``/proc``.
     """
     return _mark(os.getpid())
 
 
 def is_gone(mark: str) -> bool:
-    """Whether the marked process has certainly ended: it ran on this machine and is not there.
+    """Return whether a process with this identity ran on this machine and has ended.
 
-    False in every doubtful case: another host, another boot, another container, a mark that is not
-    one. A process that was killed and not yet reaped by its parent counts as gone.
+    Returns False in doubtful cases: another host, boot or container, or an invalid identity. A
+    process that was killed but not yet reaped by its parent has ended.
     """
     machine, _, rest = mark.partition("-")
     pid, _, start = rest.partition("-")
@@ -46,13 +46,13 @@ def _mark(pid: int) -> str:
     return f"{_machine()}-{pid}-{_started(pid) or 0}"
 
 
-# A late descendant may have the number of an ancestor that is gone.
+# A descendant may reuse the process id of an ancestor that has ended.
 os.register_at_fork(after_in_child=_mark.cache_clear)
 
 
 @lru_cache(maxsize=1)
 def _machine() -> str:
-    """Digest of host, boot and namespace: equal where process numbers mean the same."""
+    """Return a digest of host, boot and namespace: equal where process ids mean the same."""
     parts = [socket.gethostname()]
     try:
         parts.append((_PROC / "sys/kernel/random/boot_id").read_text().strip())
@@ -63,14 +63,14 @@ def _machine() -> str:
 
 
 def _started(pid: int) -> int | None:
-    """Start of a process in clock ticks after boot, 0 where unknown, None when it is gone."""
+    """Return the start of a process in clock ticks after boot, 0 if unknown, None if it ended."""
     if not (_PROC / "self/stat").exists():
         return 0 if _answers(pid) else None
     try:
         text = (_PROC / str(pid) / "stat").read_text()
     except (FileNotFoundError, ProcessLookupError):
         return None
-    # The command name, in parentheses, may itself hold spaces and parentheses.
+    # The command name, in parentheses, may itself contain spaces and parentheses.
     fields = text.rpartition(")")[2].split()
     state, start = fields[0], fields[19]
     return None if state in "ZX" else int(start)

@@ -1,4 +1,4 @@
-"""Names that were renamed in version 0.2: the old ones are read until version 0.3."""
+"""Names that changed in version 0.2. The old ones are accepted until version 0.3."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def with_new_names(
 ) -> dict[str, Any]:
     """Return `given` with its old keys renamed; with `where`, warn of each old key.
 
-    A key that stands there under both names is left alone: the old one is then unknown.
+    If both the old and the new key are present, the old one is kept, and is then an unknown key.
     """
     renamed = {}
     for key, value in given.items():
@@ -38,7 +38,7 @@ def with_new_names(
 
 
 def warn(old: str, new: str) -> None:
-    """Say once that a name was renamed; `IS_RENAMING` finds the message."""
+    """Warn once that a name was renamed. `IS_RENAMING` matches the message."""
     text = f"{old} is called {new} since version 0.2; the old name is read until version 0.3"
     warnings.warn(text, FutureWarning, stacklevel=3)
 
@@ -50,7 +50,7 @@ IS_RENAMING = r".* is called .* since version 0\.2"
 def accepts_old_names(
     names: Mapping[str, str],
 ) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
-    """Decorate a function so that it takes its renamed keyword arguments too, with a warning."""
+    """Decorate a function so that it also accepts old keyword arguments, with a warning."""
 
     def decorate(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
         @wraps(function)

@@ -1,4 +1,4 @@
-"""What became of a point: the codes in the store's ledger, each with its sentence."""
+"""Status of a point: the codes in the store's ledger, each with a sentence."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Status(IntEnum):
 
     @property
     def is_result(self) -> bool:
-        """Whether the point is finished and has an answer."""
+        """Whether the point is finished and has a result."""
         return Status.DONE <= self <= Status.NO_WINDOW
 
     @property
     def is_failure(self) -> bool:
-        """Whether the point was tried and gave no answer."""
+        """Whether the point was tried and gave no result."""
         return Status.NON_FINITE <= self <= Status.OUT_OF_MEMORY
 
 

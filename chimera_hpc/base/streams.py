@@ -1,15 +1,15 @@
-"""Random streams of a point: a function of what the point is, never of how or where it is run.
+"""Random streams of a point. They depend on its parameters, not on how or where it is run.
 
-The key of a point is the row of integers (STREAM_TAG, model, n_nodes, orientation, P, Q, seed), the
-model entering as the first 8 bytes of the BLAKE2b digest of its name, little-endian, without the
-lowest bit. Nothing else enters: neither epsilon, b, c, a tolerance, the form of the equations nor
-the radius of the initial state, so that two runs that differ only in those start from the same
-random numbers, and adding points later changes no existing one.
+The key of a point is the row of integers (STREAM_TAG, model, n_nodes, orientation, P, Q, seed). The
+model is the first 8 bytes of the BLAKE2b digest of its name, little-endian, without the lowest bit.
+The key does not contain epsilon, b, c, a tolerance, the form of the equations or the radius of the
+initial state. Two runs that differ only in those therefore start from the same random numbers, and
+points that are added later change no existing one.
 
-Each integer of the key is written as an int64 (two little-endian 32-bit words), which makes the map
-from keys to entropy one-to-one. `numpy.random.SeedSequence` over these words feeds PCG64; its spawn
-key separates the two sub-streams, 0 for the initial state and 1 for the topology, whose key ends
-with the number of reversed links.
+Each integer of the key is written as an int64 (two little-endian 32-bit words), so different keys
+give different entropy. `numpy.random.SeedSequence` over these words seeds PCG64. Its spawn key
+separates the two sub-streams: 0 for the initial state and 1 for the topology. The key of the
+topology ends with the number of reversed links.
 
 Test vectors (first two raw 64-bit outputs):
 
@@ -28,13 +28,13 @@ from operator import index
 import numpy as np
 
 STREAM_TAG = 1
-"""Version of the key; part of every key, so that a change of the rule is a change of the tag."""
+"""Version of the key. It is part of every key: a new rule needs a new tag."""
 
 
 def stream_key(
     model: str, n_nodes: int, row: Mapping[str, int | float]
 ) -> tuple[str, int, int, int, int, int]:
-    """Return what the random streams of a point depend on: model, N0, orientation, P, Q, seed."""
+    """Return the key of a point: model, N0, orientation, P, Q, seed."""
     # A user's model need not know orientation, P or Q.
     ring = (row.get("orientation", 1), row.get("P", 0), row.get("Q", 0))
     orientation, half_degree, reoriented, seed = (int(number) for number in (*ring, row["seed"]))

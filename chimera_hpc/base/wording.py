@@ -1,4 +1,4 @@
-"""Values and names as they stand in one-line messages."""
+"""Values and names as text in one-line messages."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from difflib import get_close_matches
 
 
 def short(value: object) -> str:
-    """Return the value as it may stand in a one-line message."""
+    """Return the value as text for a one-line message."""
     if isinstance(value, int) and abs(value) >= 10**30:
-        return "a huge integer"  # too long ones cannot even be printed
+        return "a huge integer"  # Python refuses to print integers with too many digits
     try:
         text = repr(value)
     except RecursionError:
@@ -17,6 +17,6 @@ def short(value: object) -> str:
 
 
 def nearest(name: str, known: list[str]) -> str:
-    """Return '; did you mean X?' or, when nothing is near, '; known: X, Y, Z'."""
+    """Return '; did you mean X?' or, without a similar name, '; known: X, Y, Z'."""
     near = get_close_matches(name[:60], known, n=1)
     return f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}"

@@ -1,4 +1,4 @@
-"""One sweep judged by several methods: classes by strength of incoherence, confusion matrices."""
+"""Agreement between methods: classes by strength of incoherence, confusion matrices."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def classes_by_incoherence(strength: ArrayLike) -> list[str]:
 
 @dataclass(frozen=True)
 class Confusion:
-    """How often one method says row and the other says column."""
+    """Confusion matrix of two methods: rows are classes of the first, columns of the second."""
 
     classes: tuple[str, ...]
     counts: Integers
-    """(k, k)"""
+    """(k, k): number of runs."""
 
     @property
     def agreement(self) -> float:
@@ -51,7 +51,7 @@ class Confusion:
 def confusion(
     first: Sequence[str | None], second: Sequence[str | None], classes: Sequence[str] = CLASSES
 ) -> Confusion:
-    """Count pairs of verdicts on the same runs; those outside `classes` are left out."""
+    """Count pairs of classes of the same runs. Runs with a class outside `classes` are left out."""
     position = {name: i for i, name in enumerate(classes)}
     counts = np.zeros((len(classes), len(classes)), dtype=np.int64)
     for one, other in zip(first, second, strict=True):

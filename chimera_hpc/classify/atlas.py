@@ -1,4 +1,4 @@
-"""An atlas: a finished classification kept to judge new runs by."""
+"""An atlas: a finished classification that is kept to classify new runs."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from chimera_hpc.classify.tree import Floats, Integers
 
 UNCLASSIFIED = "unclassified"
 Variable = tuple[tuple[str, ...], NDArray[Any]]
-"""Names of the dimensions, and values (as xarray takes a variable)."""
+"""Names of the dimensions, and values, as xarray accepts a variable."""
 
 
 class Judgement(NamedTuple):
-    """What an atlas says about n triplets."""
+    """Classes of n triplets by an atlas."""
 
     label: Integers
     """(n,): class, -1 where the triplet is not finite."""
     name: list[str]
     distance: Floats
-    """(n,): distance to the deciding training point in scaled space; NaN without a class."""
+    """(n,): distance to the nearest training point in scaled space; NaN without a class."""
 
 
 @dataclass(frozen=True)
@@ -34,16 +34,16 @@ class Atlas:
     """Training points in scaled space with their classes."""
 
     scaler: Floats
-    """(2, 3): limits of the training triplets, which go to 0 and 1."""
+    """(2, 3): smallest and largest training triplets, which are scaled to 0 and 1."""
     points: Floats
     """(m, 3): training points, scaled."""
     labels: Integers
-    """(m,)"""
+    """(m,): class of each training point."""
     names: tuple[str, ...]
 
     @classmethod
     def of(cls, classification: Classification, cut: Cut | None = None) -> Atlas:
-        """Keep one cut of a classification, the base cut unless told, over its leaves only."""
+        """Return the atlas of one cut (default: the base cut) over the leaves of the tree."""
         kept = classification.base if cut is None else cut
         labels = kept.labels[classification.members]
         return cls(classification.scaler, classification.scaled, labels, kept.names)
@@ -52,10 +52,10 @@ class Atlas:
         """Give each triplet (n, 3) the class of the nearest training point.
 
         The triplet is scaled by the training limits (it may fall outside [0, 1]^3), and the
-        Euclidean distance decides. Clusters of hierarchical clustering have no centre or border of
-        their own, so the nearest point is the rule that gives every training point its own class
-        back. The distance says how far to trust the answer: 0 at a training point, and anything
-        like the distance between two classes means that the atlas has nothing to say there.
+        Euclidean distance decides. Hierarchical clusters have neither a centre nor a border. With
+        the nearest-point rule, each training point gets its own class. The distance measures the
+        reliability of a class: it is 0 at a training point, and a class is not reliable if the
+        distance is as large as that between two classes.
         """
         values = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
         label = np.full(len(values), -1, dtype=np.int64)
@@ -69,7 +69,7 @@ class Atlas:
         return Judgement(label, name, distance)
 
     def variables(self) -> tuple[dict[str, Variable], dict[str, Any]]:
-        """Return named dimensions with arrays, and JSON attributes: what a store keeps of it."""
+        """Return the arrays with their dimensions, and the JSON attributes, that a store keeps."""
         return {
             "atlas_scaler": (("limit", "variation"), self.scaler),
             "atlas_points": (("leaf", "variation"), self.points),

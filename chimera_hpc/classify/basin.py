@@ -12,23 +12,23 @@ from chimera_hpc.classify.tree import Floats, Integers
 
 @dataclass(frozen=True)
 class BasinMap:
-    """Fraction of runs that end inside the ball they started in."""
+    """Fraction of runs that end inside the ball in which they started."""
 
     half_degree: Integers
-    """(n_P,), rising"""
+    """(n_P,), increasing"""
     radius: Floats
-    """(n_R,), rising"""
+    """(n_R,), increasing"""
     inside: Integers
     """(n_P, n_R): runs that ended inside."""
     trials: Integers
-    """(n_P, n_R)"""
+    """(n_P, n_R): runs with a result."""
     fraction: Floats
     """(n_P, n_R): inside / trials; NaN where there is no run."""
 
     def safe_radius(self, level: float = 1.0) -> Floats:
         """Return for each P the largest radius up to which f never falls below `level`.
 
-        NaN where already the smallest radius fails.
+        NaN where f at the smallest radius is below `level`.
         """
         holds = np.logical_and.accumulate(self.fraction >= level, axis=1).sum(axis=1)
         return np.where(holds > 0, self.radius[np.maximum(holds, 1) - 1], np.nan)
@@ -37,9 +37,9 @@ class BasinMap:
 def basin_map(
     half_degree: ArrayLike, radius: ArrayLike, inside: ArrayLike, counted: ArrayLike | None = None
 ) -> BasinMap:
-    """Count runs by P and R; all arguments are (n,), one entry a run.
+    """Count runs by P and R. All arguments are (n,), one entry per run.
 
-    `inside` tells whether the run's final distance from the equilibrium is at most R; runs where
+    `inside` is true where the final distance from the equilibrium is at most R. Runs where
     `counted` is false (no result) are left out.
     """
     kept = slice(None) if counted is None else np.asarray(counted, dtype=np.bool_)

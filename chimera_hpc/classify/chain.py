@@ -1,9 +1,9 @@
 """Ward's tree in linear memory, from chains of nearest neighbours.
 
-In a chain each cluster is the nearest neighbour of the one before it. Distances fall along it, so
-it ends with two clusters that are nearest to each other, and these merge at once: with Ward's
-distance no merge brings other clusters nearer, so merges found in any order give, once sorted by
-height, the tree of always merging the nearest pair (F. Murtagh, Comput. J. 26(4), 1983;
+In a chain, each cluster is the nearest neighbour of the one before it. Distances decrease along the
+chain, so it ends with two clusters that are nearest to each other. These two merge at once. With
+Ward's distance, a merge brings no other clusters nearer. The merges sorted by height are therefore
+those of the tree in which the nearest pair merges first (F. Murtagh, Comput. J. 26(4), 1983;
 D. Müllner, arXiv:1109.2378, fig. 3).
 """
 
@@ -48,7 +48,7 @@ def nearest(
 
 
 class _Clusters:
-    """The clusters that are left, packed: centroids, weights and one leaf of each."""
+    """The remaining clusters in contiguous arrays: centroids, weights and one leaf of each."""
 
     def __init__(self, points: Floats) -> None:
         self.centroids = np.array(points, dtype=np.float64, order="C")
@@ -58,7 +58,7 @@ class _Clusters:
         self.n = len(points)
 
     def merge(self, one: int, other: int) -> None:
-        """Put the union in place of `one` and the last cluster in place of `other`."""
+        """Replace `one` by the union and `other` by the last cluster."""
         share = self.weights[one] / (self.weights[one] + self.weights[other])
         # Equal centroids stay equal to the last bit.
         self.centroids[one] += share * (self.centroids[other] - self.centroids[one])
@@ -70,7 +70,7 @@ class _Clusters:
 
 
 def _merges(points: Floats) -> Iterator[tuple[int, int, float]]:
-    """Yield of each merge a leaf of either cluster and the height; the order is the chains'."""
+    """Yield (leaf, leaf, height) of each merge, in the order in which the chains find them."""
     clusters = _Clusters(points)
     chain, reach = [0], [np.inf]
     while clusters.n > 1:
@@ -90,7 +90,7 @@ def _merges(points: Floats) -> Iterator[tuple[int, int, float]]:
 
 
 def _number(merges: list[tuple[int, int, float]]) -> Floats:
-    """Return the linkage matrix of merges that are sorted by height and name clusters by a leaf."""
+    """Return the linkage matrix of merges (leaf, leaf, height) that are sorted by height."""
     n_leaves = len(merges) + 1
     parent = list(range(2 * n_leaves - 1))
     size = [1] * n_leaves
@@ -104,7 +104,7 @@ def _number(merges: list[tuple[int, int, float]]) -> Floats:
 
 
 def _root(parent: list[int], node: int) -> int:
-    """Return the cluster that `node` is in by now, and halve the way there."""
+    """Return the current cluster of `node`, and halve the path to it (path halving)."""
     while parent[node] != node:
         parent[node] = parent[parent[node]]
         node = parent[node]

@@ -1,7 +1,7 @@
 """From triplets of total variations to named classes (paper, ssec:classific).
 
-The triplets (V_theta, V_a, V_Omega) of all oscillating runs are scaled to [0, 1], merged bottom-up
-into one tree, and the tree is cut by number of clusters or at a depth threshold d.
+The triplets (V_theta, V_a, V_Omega) of all oscillating runs are scaled to [0, 1] and merged
+bottom-up into one tree. The tree is cut by number of clusters or at a depth threshold d.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from chimera_hpc.classify import naming, tree
 from chimera_hpc.classify.tree import Floats, Integers, Split
 
 LARGEST_TREE: dict[tree.Linkage, int] = {"ward": 50_000, "average": 10_000, "complete": 10_000}
-"""Points in one tree: 8 s for as many with Ward's linkage; 0.8 GB and 4 s with the others."""
+"""Most points in one tree. They take 8 s with Ward's linkage, 0.8 GB and 4 s with the others."""
 
 _BINS = 8
 
@@ -57,14 +57,14 @@ class Classification:
     cuts: dict[int, Cut]
     """By the number of clusters asked for."""
     base: Cut
-    """The cut whose classes the naming rule names directly; it need not be among `cuts`."""
+    """The cut whose classes the naming rule names directly. It may be missing from `cuts`."""
     depth: float | None
-    """The depth threshold asked for, if any; its cut is in `cuts` under its number of clusters."""
+    """The requested depth threshold, if any. Its cut is in `cuts` by its number of clusters."""
     sampled: bool
-    """Whether the tree holds a sample only, and other points took the label of the nearest leaf."""
+    """Whether the tree holds a sample only. Other points have the label of the nearest leaf."""
 
     def order_of_splits(self, until: int = 8) -> tuple[Split, ...]:
-        """Tell which base class splits at each step as the depth threshold falls."""
+        """Return which class splits at each step as the depth threshold decreases."""
         leaf_labels = self.base.labels[self.members]
         return tree.splits_below(self.linkage, leaf_labels, self.base.names, until)
 
@@ -85,27 +85,27 @@ def classify(
     Parameters
     ----------
     triplets : (n, 3) array
-        V_theta, V_a, V_Omega; rows of points that are not DONE are ignored (NaN is fine there).
+        V_theta, V_a, V_Omega. Rows of points that are not DONE are ignored and may be NaN.
     status : (n,) integers
         `chimera_hpc.base.status.Status` of each point.
     linkage : {"ward", "average", "complete"}
-    cuts : numbers of clusters. A cut never parts equal points, so it may hold fewer classes than
-        asked for (down to none when nothing oscillates).
+    cuts : numbers of clusters. Equal points stay in one cluster, so a cut may have fewer classes
+        than requested (none if no run oscillates).
     depth : depth threshold d in scaled space: merges higher than d are undone.
-    names : "triplet" or a list of names by rising V_theta; see `naming.name_base`.
-        Finer cuts inherit the names along the tree and get suffixes where a class really split.
-    largest_tree : beyond this many points (`LARGEST_TREE` by default) the tree grows over a sample
-        of about that size, drawn without chance: points are ordered by box of an 8 x 8 x 8 grid
-        over scaled space and taken at equal distances in that order, and the first point of each
-        box is always in. All others take the class of the nearest sampled point.
-        `Classification.sampled` tells.
-    known : linkage and members of an earlier classification of the same points, which spares
-        growing the tree again.
+    names : "triplet" or a list of names by increasing V_theta; see `naming.name_base`.
+        Finer cuts inherit the names along the tree. A class that splits gets suffixes.
+    largest_tree : largest number of points in the tree (default `LARGEST_TREE`). With more points,
+        the tree is built from a deterministic sample of about that size: points are sorted by box
+        of an 8 x 8 x 8 grid over scaled space and taken at equal steps, together with the first
+        point of each box. Other points get the class of the nearest sampled point, and
+        `Classification.sampled` is true.
+    known : linkage and members of an earlier classification of the same points. The tree is then
+        not built again.
 
     Notes
     -----
-    Points enter the tree in lexicographic order, so the classes do not depend on the order in
-    which points are given.
+    Points enter the tree in lexicographic order, so the classes do not depend on the order of the
+    points.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _check(linkage: str, cuts: Sequence[int], depth: float | None) -> None:
 
 
 def _sample(scaled: Floats, largest: int) -> Integers:
-    """Return the rows that enter the tree, in an order that depends on their values only."""
+    """Return the rows that enter the tree. Their order depends on their values only."""
     order = np.lexsort(scaled.T[::-1])
     if len(order) <= largest:
         return order.astype(np.int64)
@@ -169,7 +169,7 @@ def _sample(scaled: Floats, largest: int) -> Integers:
 
 
 def _nearest_leaf(scaled: Floats, leaves: Integers) -> Integers:
-    """Return for each row the leaf that it is, or else the one nearest to it."""
+    """Return for each row its own leaf, or the nearest one if the row is not in the tree."""
     position = np.full(len(scaled), -1, dtype=np.int64)
     position[leaves] = np.arange(len(leaves))
     missing = np.flatnonzero(position < 0)

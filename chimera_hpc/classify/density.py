@@ -1,4 +1,4 @@
-"""Classes of one scalar from its own density: sigma_l of the paper (fig:sigmal)."""
+"""Classes of one scalar from its density: sigma_l of the paper (fig:sigmal)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class DensityClasses:
     density: Floats
     """(g,) density on the grid; its integral is 1."""
     modes: Floats
-    """(k,) abscissae of the local maxima, rising."""
+    """(k,) abscissae of the local maxima, increasing."""
     cuts: Floats
     """(k - 1,) abscissae of the minima between neighbouring modes."""
     labels: Integers
@@ -37,8 +37,8 @@ class DensityClasses:
 def bandwidth_by_rule(values: Floats) -> float:
     """Return Silverman's bandwidth 0.9 min(s, IQR / 1.34) n^(-1/5).
 
-    Silverman 1986, Density Estimation for Statistics and Data Analysis, eq. (3.31). A sample with
-    no spread gets a bandwidth of 1e-3 of its size (or 1e-3).
+    Silverman 1986, Density Estimation for Statistics and Data Analysis, eq. (3.31). If all values
+    are equal, the bandwidth is 1e-3 of their modulus, or 1e-3 if they are 0.
     """
     low, high = np.percentile(values, [25.0, 75.0])
     spreads = [s for s in (float(np.std(values, ddof=1)), float(high - low) / 1.34) if s > 0.0]
@@ -51,10 +51,10 @@ def density_classes(values: ArrayLike, bandwidth: float | None = None) -> Densit
     """Class values (n,) by the modes of their Gaussian kernel density estimate.
 
     f(x) = 1/(n h) sum_i phi((x - x_i)/h) on a grid of 1024 points that reaches 3 h beyond the data.
-    The number of classes is the number of modes of f, the cuts are its minima between modes: no
-    threshold is asked for. `bandwidth` h is Silverman's unless given; `stable_bandwidths` tells how
-    much it matters. Values that are not finite get label -1; steady runs have sigma_l near 0 and
-    belong in.
+    There is one class per mode of f. The cuts are the minima of f between modes, so no threshold is
+    needed. The default `bandwidth` h is Silverman's; `stable_bandwidths` gives the range with the
+    same number of modes. Values that are not finite get label -1. Steady runs have sigma_l near 0
+    and should be included.
 
     Raises
     ------
@@ -80,9 +80,9 @@ def density_classes(values: ArrayLike, bandwidth: float | None = None) -> Densit
 def stable_bandwidths(values: ArrayLike, n_modes: int) -> tuple[float, float]:
     """Return the smallest and the largest bandwidth whose density has `n_modes` modes.
 
-    The number of modes of a Gaussian kernel estimate never rises with the bandwidth (Silverman
-    1981, doi:10.1111/j.2517-6161.1981.tb01155.x), so bisection finds both ends, to one part in a
-    thousand; the upper end is infinite for one mode, and both are equal where no bandwidth gives
+    The number of modes of a Gaussian kernel estimate never increases with the bandwidth (Silverman
+    1981, doi:10.1111/j.2517-6161.1981.tb01155.x), so bisection finds both ends, with a relative
+    error of 1e-3. The upper end is infinite for one mode. Both ends are equal if no bandwidth gives
     that number. `n_modes` is at least 1.
     """
     data = np.asarray(values, dtype=np.float64).ravel()
@@ -115,7 +115,7 @@ def _estimate(data: Floats, bandwidth: float) -> tuple[Floats, Floats]:
 
 
 def _maxima(density: Floats) -> Integers:
-    """Return the local maxima; of a plateau (rounding makes some) its first point."""
+    """Return the local maxima. A plateau, which rounding may cause, gives its first point."""
     slope = np.sign(np.diff(density))
     moving = np.flatnonzero(slope)
     falls = (slope[moving[:-1]] > 0) & (slope[moving[1:]] < 0)

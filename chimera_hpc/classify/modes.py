@@ -16,7 +16,7 @@ from chimera_hpc.classify.tree import Floats, Integers
 
 
 class CellTable(Protocol):
-    """What is asked of a list of points."""
+    """What this module needs of a list of points."""
 
     def cells(self) -> tuple[NDArray[np.int64], Mapping[str, NDArray[Any]]]:
         """Return the cell of each point (n,) and the columns that name the cells (n_cells,)."""
@@ -26,10 +26,10 @@ class CellTable(Protocol):
 def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[str, Any]]:
     """Describe each cell by its coordinates and by ``class``, ``votes`` and ``entropy_bits``.
 
-    Every run with a result has one vote: its class, ``steady``, or ``no_window`` (it moves, but
-    too slowly to be classified). The modal class is taken over the classified runs; ties go to the
+    Every run with a result has one vote: its class, ``steady``, or ``no_window`` (it varies, but
+    too slowly to be classified). The modal class is taken over the classified runs. Ties go to the
     class with more members in the whole cut, then to the first in its order. A cell whose runs are
-    all steady or without a window is ``steady``; a cell without any result has class None and no
+    all steady or without a window is ``steady``. A cell without a result has class None and no
     votes. The entropy -sum p log2 p is that of the votes.
     """
     cell_of_point, columns = points.cells()
@@ -59,7 +59,7 @@ def vote_labels(labels: Integers, status: ArrayLike, n_classes: int) -> Integers
 
 
 def count_votes(cell_of_point: Integers, labels: Integers, n_cells: int) -> Integers:
-    """Count labels per cell: (n_cells, largest label + 1); negative labels do not count."""
+    """Count labels per cell, shape (n_cells, largest label + 1). Negative labels are ignored."""
     valid = labels >= 0
     counts = np.zeros((n_cells, int(labels.max(initial=-1)) + 1), dtype=np.int64)
     np.add.at(counts, (cell_of_point[valid], labels[valid]), 1)
@@ -81,8 +81,9 @@ def modal_labels(votes: Integers, sizes: Integers) -> Integers:
 def modal_votes(votes: Integers, sizes: Integers) -> Integers:
     """Return the modal class of each row of `votes` (n, k + 2), whose last columns are no classes.
 
-    They count steady runs and those without a window, and decide only where no run has a class:
-    such a row is k (steady), an empty one -1. `sizes` (k,) settles ties, see `modal_labels`.
+    The last two columns count steady runs and runs without a window. They decide only if no run
+    has a class: the result is then k (steady). It is -1 for an empty row. `sizes` (k,) decides
+    ties, see `modal_labels`.
     """
     modal = modal_labels(votes[:, : len(sizes)], sizes)
     silent = np.where(votes.any(axis=1), len(sizes), -1)
@@ -105,9 +106,9 @@ def run_names(labels: Integers, status: ArrayLike, names: Sequence[str]) -> list
 
 
 def class_for_comparison(cell: Mapping[str, Any], cut: Cut) -> str | None:
-    """Return a cell's modal base class when steady votes count as ordered, as the paper has it.
+    """Return a cell's modal base class, with steady votes counted as ordered (as in the paper).
 
-    Sub-classes count for their base class; ties go to the larger total membership.
+    Votes of sub-classes are counted for their base class. Ties go to the class with more members.
     """
     family_of = dict(zip(cut.names, cut.families, strict=True)) | {STEADY: "ordered"}
     votes: dict[str, int] = {}

@@ -16,7 +16,7 @@ Rule = str | Sequence[str]
 
 
 def base_size(rule: Rule) -> int:
-    """Return the number of clusters of the base cut, the one that `rule` names directly.
+    """Return the number of clusters of the base cut, which `rule` names directly.
 
     Raises
     ------
@@ -37,11 +37,11 @@ def base_size(rule: Rule) -> int:
 def name_base(centroids: Floats, rule: Rule) -> list[str]:
     """Name the clusters of the base cut by their centroids (k, 3) in (V_theta, V_a, V_Omega).
 
-    ``"triplet"``: of three clusters, chimera has the largest V_Omega; of the other two, ordered has
-    the smaller V_theta. With only two clusters (two different points in all), ordered has the
-    smaller V_theta, and the other is a chimera if its V_Omega is the larger, else disordered; a
-    single cluster is ordered. A list of names goes to the clusters by rising V_theta, from its
-    start when there are fewer clusters than names.
+    ``"triplet"``: of three clusters, chimera has the largest V_Omega. Of the other two, ordered has
+    the smaller V_theta. Of two clusters (only two different points), ordered has the smaller
+    V_theta; the other is chimera if its V_Omega is larger, else disordered. A single cluster is
+    ordered. A list of names is assigned by increasing V_theta. If there are fewer clusters than
+    names, the first names are used.
     """
     by_phase = [int(i) for i in np.argsort(centroids[:, 0], kind="stable")]
     names = [""] * len(centroids)
@@ -63,8 +63,8 @@ def name_base(centroids: Floats, rule: Rule) -> list[str]:
 def inherit(base_labels: Integers, base_names: Sequence[str], labels: Integers) -> list[str]:
     """Return the family of each cluster in `labels`: the base class that holds most of its members.
 
-    A finer cluster lies wholly inside one base class. A coarser one is a union of base classes and
-    takes the name of the largest of them, so names stay different.
+    A finer cluster lies inside one base class. A coarser one is a union of base classes and takes
+    the name of the largest, so names stay different.
     """
     counts = np.zeros((labels.max() + 1, len(base_names)), dtype=np.int64)
     np.add.at(counts, (labels, base_labels), 1)
@@ -72,10 +72,10 @@ def inherit(base_labels: Integers, base_names: Sequence[str], labels: Integers) 
 
 
 def add_suffixes(families: Sequence[str], centroids: Floats) -> list[str]:
-    """Append -1, -2, ... to families that hold several clusters, by falling V_a of the centroid.
+    """Append -1, -2, ... to families of several clusters, by decreasing V_a of the centroid.
 
-    Falling V_a is the order in which the paper numbers its sub-classes (fig:orient1_5classes:
-    weakly homogeneous before travelling wave, irregular before nearly equal amplitudes).
+    The paper numbers its sub-classes in this order (fig:orient1_5classes: weakly homogeneous
+    before travelling wave, irregular before nearly equal amplitudes).
     """
     names = list(families)
     for family in set(families):

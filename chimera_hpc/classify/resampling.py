@@ -1,4 +1,4 @@
-"""How firm labels and modal classes are: runs labelled twice, and seeds resampled."""
+"""Stability of labels and modal classes: runs labelled twice, and seeds resampled."""
 
 from __future__ import annotations
 
@@ -14,21 +14,20 @@ from chimera_hpc.classify.tree import Floats, Integers
 
 DRAWS = 1000
 FIRM = 0.9
-"""Share of the resamplings that a modal class has to keep to be called firm."""
+"""A modal class is firm if at least this share of the resamplings gives it."""
 
 
 class Change(NamedTuple):
-    """How a second labelling of the same runs differs from the first."""
+    """Differences between two labellings of the same runs."""
 
     changed: int
     of: int
-    """Runs that have a label in both."""
+    """Number of runs that have a label in both."""
     low: float
     high: float
     """Wilson 95 % interval of the share that changed."""
     total_variation: float
-    """0.5 * sum |q - p| over the class fractions p before and q after: the share of the runs that
-    would have to move for such a change."""
+    """0.5 * sum |q - p| over the class fractions p before and q after (total variation)."""
     net: dict[str, float]
     """q - p of each class where it is not 0."""
     moves: dict[str, int]
@@ -36,7 +35,7 @@ class Change(NamedTuple):
 
 
 def compare_labels(before: Sequence[str], after: Sequence[str | None]) -> Change:
-    """Compare two labellings of the same runs; one without a label after (None) is left out."""
+    """Compare two labellings of the same runs. A run without a label after (None) is left out."""
     pairs = [(a, b) for a, b in zip(before, after, strict=True) if b is not None]
     moves = Counter(f"{a} to {b}" for a, b in pairs if a != b)
     low, high = wilson_interval(moves.total(), len(pairs))
@@ -70,7 +69,7 @@ def kept_shares(
     votes : (n_cells, k + 2)
         Runs by class, then steady ones and those without a window, as for `modal_votes`.
     sizes : (k,)
-        Members of each class in the whole sweep, which settle ties.
+        Members of each class in the whole sweep, which decide ties.
 
     Returns
     -------
@@ -86,11 +85,11 @@ def kept_shares(
 
 
 def spread_sample(cell: Integers, usable: Integers, size: int, seed: int) -> Integers:
-    """Return `size` of the points `usable`, spread evenly over their cells; rising.
+    """Return `size` of the points `usable`, in increasing order, spread evenly over their cells.
 
-    Points are put into the random order of ``numpy.random.default_rng(seed)``; no cell gives a
-    second point before every other one with points has given its first, and so on. So a larger
-    sample with the same seed holds the smaller one.
+    Points are put into the random order of ``numpy.random.default_rng(seed)``. Each cell gives its
+    first point, then each gives its second, and so on. A larger sample with the same seed contains
+    the smaller one.
 
     Parameters
     ----------

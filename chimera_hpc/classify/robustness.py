@@ -26,7 +26,7 @@ def wilson_interval(
     shrink = 1.0 + z * z / n
     centre = (p + 0.5 * z * z / n) / shrink
     half = z / shrink * np.sqrt(p * (1.0 - p) / n + 0.25 * (z / n) ** 2)
-    # Exact ends: rounding leaves 1e-17 where the formula gives 0 or 1.
+    # The formula gives exactly 0 and 1 here; rounding leaves 1e-17.
     low = np.where((p == 0.0) | (count == 0), 0.0, centre - half)
     high = np.where((p == 1.0) | (count == 0), 1.0, centre + half)
     return low, high
@@ -37,7 +37,7 @@ class FractionCurve:
     """Fraction of runs that hit, for each value of a parameter."""
 
     x: Floats
-    """(k,) parameter values, rising."""
+    """(k,) parameter values, increasing."""
     hits: Integers
     trials: Integers
     fraction: Floats
@@ -59,10 +59,10 @@ class FractionCurve:
 def fraction_curve(
     x: ArrayLike, hit: ArrayLike, counted: ArrayLike | None = None, confidence: float = 0.95
 ) -> FractionCurve:
-    """Collect runs by their value of x (n,) and count those with `hit` (n,) true.
+    """Group runs by their value of x (n,) and count those where `hit` (n,) is true.
 
-    `counted` (n,) leaves out runs without a result; for W(Q_r), `hit` is "judged a chimera", so
-    steady runs count as trials without a hit.
+    Runs where `counted` (n,) is false (no result) are left out. For W(Q_r), `hit` means that the
+    class is chimera, so a steady run is a trial without a hit.
     """
     values, position = np.unique(np.asarray(x, dtype=np.float64), return_inverse=True)
     keep: NDArray[np.bool_] = (

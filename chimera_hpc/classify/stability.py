@@ -25,8 +25,8 @@ Complex = NDArray[np.complex128]
 def block_eigenvalues(slope: float, epsilon: float, c: float, singular: Floats) -> Complex:
     """Eigenvalues of J_alpha for each singular value b_alpha (k,), shape (k, 2).
 
-    ``slope`` is 1 - u*^2. Roots of l^2 - (s/e + c) l + (c s/e + b^2/e), by the stable formula: the
-    root of larger modulus first, the other from the product.
+    ``slope`` is 1 - u*^2. They are the roots of l^2 - (s/e + c) l + (c s/e + b^2/e). To avoid
+    cancellation, the root of larger modulus is computed first, the other from the product.
     """
     trace = slope / epsilon + c
     product = c * slope / epsilon + np.asarray(singular) ** 2 / epsilon

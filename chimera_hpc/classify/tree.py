@@ -1,4 +1,4 @@
-"""One tree of merges (dendrogram): how it is grown, cut, and read from the top."""
+"""A tree of merges (dendrogram): build it, cut it, and list its splits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Integers = NDArray[np.int64]
 Linkage = Literal["ward", "average", "complete"]
 LINKAGES: tuple[Linkage, ...] = ("ward", "average", "complete")
 MOST_BY_SCIPY = 4_000
-"""Points of a tree by Ward's method that SciPy grows, in 64 MB."""
+"""Most points for which SciPy builds Ward's tree; it then takes 64 MB."""
 
 
 def limits(points: Floats) -> Floats:
@@ -27,10 +27,10 @@ def limits(points: Floats) -> Floats:
 
 
 def scale(points: Floats, scaler: Floats) -> Floats:
-    """Map each column affinely so that `scaler` (2, n_columns) goes to 0 and 1.
+    """Scale each column linearly so that the limits `scaler` (2, n_columns) become 0 and 1.
 
-    Equal to scikit-learn's ``MinMaxScaler``; a constant column goes to 0. Points outside the limits
-    fall outside [0, 1] and are not clipped.
+    Equal to scikit-learn's ``MinMaxScaler``. A constant column becomes 0. Points outside the limits
+    are not clipped.
     """
     span = scaler[1] - scaler[0]
     scaled: Floats = (points - scaler[0]) / np.where(span > 0.0, span, 1.0)
@@ -40,9 +40,9 @@ def scale(points: Floats, scaler: Floats) -> Floats:
 def grow(scaled: Floats, method: Linkage) -> Floats:
     """Return SciPy's linkage matrix (m - 1, 4) of m points; (0, 4) for fewer than two.
 
-    Row i merges two clusters into cluster m + i at the height in column 2; heights never fall
-    (true of ward, average and complete linkage). Takes O(m^2) time and memory; Ward's beyond
-    `MOST_BY_SCIPY` points takes O(m) memory.
+    Row i merges two clusters into cluster m + i at the height in column 2. Heights never decrease
+    with ward, average and complete linkage. Time and memory are O(m^2). With Ward's method and more
+    than `MOST_BY_SCIPY` points, memory is O(m).
     """
     if len(scaled) < 2:
         return np.empty((0, 4))
@@ -51,12 +51,12 @@ def grow(scaled: Floats, method: Linkage) -> Floats:
         from chimera_hpc.classify import chain
 
         return chain.ward(scaled)
-    # Distances, not points: as many points as columns could be taken for a matrix of distances.
+    # Distances are passed, because SciPy may take a square array of points for distances.
     return np.asarray(hierarchy.linkage(pdist(scaled), method=method), dtype=np.float64)
 
 
 def separable(tree: Floats) -> int:
-    """Return the largest number of clusters that does not part equal points."""
+    """Return the largest number of clusters that does not separate equal points."""
     return 1 + int(np.count_nonzero(tree[:, 2] > 0.0))
 
 
@@ -68,8 +68,8 @@ def clusters_at(tree: Floats, depth: float) -> int:
 def cut(tree: Floats, n_clusters: int) -> Integers:
     """Undo the last ``n_clusters - 1`` merges and number the clusters of the m leaves from 0.
 
-    Clusters of a finer cut lie inside those of a coarser one. Fewer clusters come back when the
-    tree holds fewer different points.
+    Clusters of a finer cut lie inside those of a coarser one. There are fewer clusters than
+    requested if the tree has fewer different points.
     """
     n_leaves = len(tree) + 1
     owner = np.arange(2 * n_leaves - 1)
@@ -81,9 +81,9 @@ def cut(tree: Floats, n_clusters: int) -> Integers:
 
 
 def middle_height(tree: Floats, n_clusters: int) -> float:
-    """Return a height at which a line cuts the tree into `n_clusters`: half-way between two merges.
+    """Return a height that cuts the tree into `n_clusters`, halfway between two merges.
 
-    Above the root (by a twentieth of its height) for one cluster.
+    For one cluster it is 1.05 times the height of the root.
     """
     heights = np.concatenate([[0.0], tree[:, 2]])
     undone = min(n_clusters, separable(tree)) - 1
@@ -94,15 +94,15 @@ def middle_height(tree: Floats, n_clusters: int) -> float:
 
 @dataclass(frozen=True)
 class Split:
-    """One event as the depth threshold falls: at `depth` a cluster of class `name` parts in two."""
+    """A split as the depth threshold decreases: at `depth`, a cluster of class `name` splits."""
 
     depth: float
     n_clusters: int
-    """Number of clusters below the event."""
+    """Number of clusters after the split."""
     name: str
-    """The class, among those of the starting cut, that the parted cluster belongs to."""
+    """Class of the cluster in the starting cut."""
     sizes: tuple[int, int]
-    """Leaves in the two parts, larger first."""
+    """Number of leaves in the two parts, larger first."""
 
 
 def splits_below(

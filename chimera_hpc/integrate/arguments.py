@@ -1,6 +1,6 @@
-"""What the stepping loop takes: arrays and numbers under the names they have in its formulas.
+"""Arguments of the stepping loop: arrays and numbers, named as in its formulas.
 
-The types of the fields are those that the loop is compiled for; nothing is converted.
+The loop is compiled for the types of the fields. Values are not converted.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Lanes(NamedTuple):
     y1: Array
     """State after the step, (rows, lanes)."""
     k: Array
-    """Stages, one after the other, and the error estimate: ((stages + 1) * rows, lanes)."""
+    """Stages in order, then the error estimate: ((stages + 1) * rows, lanes)."""
     weights: Array
     """Scratch: the weights of the stages in two samples, (2 * stages, `LANES`)."""
     lane: Array
@@ -29,7 +29,7 @@ class Lanes(NamedTuple):
     counters: NDArray[np.int64]
     """Counters of each lane, (COUNT_ROWS, lanes): see `lane_rows`."""
     samples: Array
-    """Samples, (lanes, samples, width): begins a cache line; width is a multiple of `LANES`."""
+    """Samples, (lanes, samples, width). Aligned to a cache line; width is a multiple of `LANES`."""
 
 
 class Method(NamedTuple):
@@ -42,7 +42,7 @@ class Method(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Tolerances, end and budget of the run; first sampling time and sampling step."""
+    """Tolerances, end time and step limit of the run; first sampling time and sampling step."""
 
     rtol: float
     atol: float
@@ -53,10 +53,10 @@ class Limits(NamedTuple):
 
 
 class Step(NamedTuple):
-    """The step being made, inside the loop: ``first`` is where in ``k`` its first stage begins.
+    """The current step inside the loop. ``first`` is the offset of its first stage in ``k``.
 
-    ``first`` counts units, of which each stage has ``units``: a row of eight lanes, or eight rows
-    of one lane.
+    ``first`` is in units, and each stage has ``units`` of them. A unit is a row of eight lanes, or
+    eight rows of one lane.
     """
 
     y: Array

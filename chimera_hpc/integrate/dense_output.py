@@ -1,8 +1,8 @@
 """Samples between the steps, by the continuous extension of the method (HNW sec. II.6).
 
-Arrays and notation as in `stepper` and `arguments`. Samples are written in whole vectors, past the
-caches: a lane's samples follow each other; each holds the observed rows of the state, up to a whole
-number of vectors.
+Arrays and notation as in `stepper` and `arguments`. Samples are written in whole vectors and bypass
+the caches. The samples of a lane are contiguous. Each sample holds the observed rows of the state,
+padded to a whole number of vectors.
 """
 
 from chimera_hpc.integrate.jit import jit
@@ -42,7 +42,7 @@ def _weight(p, j, theta):
 
 @jit()
 def _between(h, step, weights, i):
-    # Row i of the state at time t + theta h of the step just made, by the continuous extension.
+    # Row i of the state at time t + theta h of the current step, by the continuous extension.
     stages = weights.shape[0] // 2
     total = load(h, weights, 0) * load(h, step.k, step.first + i)
     for j in range(1, stages - 1):
@@ -64,7 +64,7 @@ def _eight(h, rows, i):
 
 @jit()
 def _eight_of(j, h, step, stages, i):
-    # Rows i ... i + 7 of stage j; the first stage and the last may have changed places.
+    # Rows i ... i + 7 of stage j; the first and the last stage may be swapped.
     if j == 0:
         return _eight(h, step.k, step.first + i)
     return _eight(h, step.k, j * step.units + i - (step.first if j == stages - 1 else 0))
@@ -84,7 +84,7 @@ def _fma_each(w, a, b):
 
 @jit()
 def _tile(h, step, weights, i):
-    # Rows i ... i + 7 of what `_between` gives, the weights read once for all of them.
+    # Rows i ... i + 7 of `_between`; the weights are read once for all of them.
     stages = weights.shape[0] // 2
     tile = _times(load(h, weights, 0), _eight_of(0, h, step, stages, i))
     for j in range(1, stages):
@@ -94,7 +94,7 @@ def _tile(h, step, weights, i):
 
 @jit()
 def _two_tiles(h, step, weights, i):
-    # The same for two samples, the stages read once for both.
+    # The same for two samples; the stages are read once for both.
     stages = weights.shape[0] // 2
     rows = _eight_of(0, h, step, stages, i)
     tile, after = _times(load(h, weights, 0), rows), _times(load(h, weights, stages), rows)
@@ -121,7 +121,7 @@ def _due(lanes, limits, after, is_due, theta):
             and t <= lane[TIME_NEW, m]
         )
         due += count[is_due, m]
-        # Lanes that are not due get the state before the step, which is not read.
+        # Lanes without a due sample get the state before the step, which is not read.
         lane[theta, m] = 0.0
         if count[is_due, m] == 1:
             lane[theta, m] = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
@@ -137,8 +137,8 @@ def _weigh(like, lanes, row, p, first):
 
 @jit()
 def _keep(samples, count, is_due, at, m, i, vector):
-    # Rows i ... i + 7 of lane m's sample, where one is due. Called for each lane and each vector of
-    # rows, and not inlined: it takes the two arrays that it uses, not all of `Lanes`.
+    # Rows i ... i + 7 of lane m's sample, if one is due. This function is called often and not
+    # inlined, so it takes the two arrays that it uses instead of all of `Lanes`.
     if count[is_due, m] == 1:
         total, width = samples.shape[1:]
         stream_at(samples, (m * total + count[NEXT_SAMPLE, m] + at) * width + i, vector)
@@ -161,7 +161,7 @@ def _keep_tile(samples, count, is_due, at, i, tile):
 def sample(like, h, step, lanes, p, limits):
     """Write the observed rows at the sampling times that the accepted steps cover.
 
-    The lanes take their first two, second two, ... samples of the step together.
+    The samples of a step are written two at a time, in all lanes together.
     """
     count, weights, samples = lanes.counters, lanes.weights, lanes.samples
     width = samples.shape[2]

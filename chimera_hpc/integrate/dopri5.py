@@ -1,4 +1,4 @@
-"""Dormand-Prince 5(4), the classical pair of the same order."""
+"""Dormand-Prince 5(4), a classical pair of the same order as Tsitouras 5(4)."""
 
 import numpy as np
 

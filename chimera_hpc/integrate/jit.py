@@ -1,12 +1,11 @@
-"""The project's one way to compile: strict IEEE arithmetic, no GIL, a cache that never goes stale.
+"""Compilation of all kernels: strict IEEE arithmetic, no GIL, a cache that is never stale.
 
-numba keys its on-disk cache by the file of the compiled function alone. A kernel that calls a
-function of another file would stay as it was after an edit of that other file. Here the name of the
-cache folder is a digest of every source file that holds kernels, so an edit of any of them starts a
-new folder.
+numba's on-disk cache depends on the file of the compiled function only. If a kernel calls a
+function of another file and that file is edited, numba does not compile the kernel again. Here the
+name of the cache folder is a digest of all source files that hold kernels, so an edit of any of
+them starts a new folder.
 
-numba itself is loaded when the first kernel is declared; the place of the cache is known without
-it.
+numba is loaded when the first kernel is declared. The path of the cache is known without it.
 """
 
 from __future__ import annotations
@@ -60,9 +59,9 @@ def kernel_sources() -> list[Path]:
 def cache_folder() -> str:
     """Folder of the compiled kernels.
 
-    ``$NUMBA_CACHE_DIR`` where it is set (a cluster job sets it to a node-local folder), else
-    the user's cache folder, else, where that can't be written, a temporary folder. Folders of other
-    sources next to it that no process has asked for in `_UNUSED_DAYS` days are removed.
+    It is in ``$NUMBA_CACHE_DIR`` if set (a cluster job sets it to a node-local folder), else in the
+    user's cache folder, or in a temporary folder if that one is not writable. Folders of other
+    sources next to it are removed if no process has used them for `_UNUSED_DAYS` days.
     """
     base = os.environ.get("NUMBA_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -80,10 +79,10 @@ def cache_folder() -> str:
 
 
 def _remove_unused(root: Path) -> None:
-    """Remove the folders of other digests whose last use is long ago.
+    """Remove the folders of other digests that have not been used for a long time.
 
-    Each is renamed first, so that one of several processes removes it and no process reads half of
-    it.
+    Each folder is renamed first, so that only one process removes it and no process reads a folder
+    that is partly removed.
     """
     before = time.time() - _UNUSED_DAYS * 86400
     for folder in root.iterdir():
@@ -98,7 +97,7 @@ def _remove_unused(root: Path) -> None:
 def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile as ``numba.njit`` does, with the options of every kernel and the project's cache.
 
-    The options are `OPTIONS`; compiled code is kept on disk.
+    The options are `OPTIONS`. Compiled code is cached on disk.
     """
     numba = _numba()
 
@@ -114,9 +113,9 @@ def jit(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def compile_uncached(signature: Any, function: Callable[..., Any]) -> Any:
-    """Compile a user's function as `jit` does, but keep nothing of it on disk.
+    """Compile a user's function as `jit` does, but do not cache it on disk.
 
-    Its source, and what it calls, may be edited between two processes at any time.
+    The function, or one that it calls, may be edited between two runs.
     """
     return _numba().njit(signature, **OPTIONS)(function)
 

@@ -7,5 +7,5 @@ LANE_ROWS = 8
 # Rows of the lanes' counters, ``counters`` (COUNT_ROWS, lanes).
 STATE, NEXT_SAMPLE, ACCEPTED, TRIED, REJECTED_LAST, IS_DUE, IS_DUE_AFTER = 0, 1, 2, 3, 4, 5, 6
 COUNT_ROWS = 7
-# Values of the row STATE that are not a `Status`: empty, just put in, running.
+# Values of the row STATE that are not a `Status`: empty, new, running.
 IDLE, FRESH, RUNNING = -2, -1, 0

@@ -1,4 +1,4 @@
-"""Keeps the lanes of the stepping loop busy: puts trajectories in and takes finished ones out."""
+"""Run many trajectories in the lanes of the stepping loop: start new ones, take finished ones."""
 
 from __future__ import annotations
 
@@ -32,22 +32,23 @@ from chimera_hpc.integrate.tsit5 import TSIT5
 
 Array = NDArray[np.float64]
 
-# Wall time that one call of the compiled loop aims at, seconds: between calls Python has the GIL
-# and sees time-outs and stop signals.
+# Target wall time of one call of the compiled loop, seconds. Between calls, Python holds the GIL
+# and handles time-outs and stop signals.
 SLICE = 0.1
-# Steps times numbers of the state in the first call, before the speed is known, and its most steps.
+# Steps times size of the state in the first call, before the speed is known; its largest number of
+# steps.
 FIRST_WORK, FIRST_STEPS = 2_000_000, 64
-# Bytes that the sample buffers of all lanes may take together before fewer lanes are used.
+# Largest size of the sample buffers of all lanes, bytes. Fewer lanes are used beyond it.
 SAMPLE_BYTES = 96_000_000
-# Bytes of state of `LANES` trajectories together: as much as stays in a core's second cache.
-# Beyond, one trajectory after the other is faster, since its state is an eighth of that.
+# Largest state of `LANES` trajectories together, bytes: it must fit in a core's second-level cache.
+# Beyond it, single trajectories are faster, because each needs an eighth of the memory.
 VECTOR_BYTES = 1_000_000
-# Fewer trajectories than this go one by one: idle lanes cost as much as busy ones.
+# Fewer trajectories than this run one by one, because idle lanes cost as much as busy ones.
 VECTOR_TRAJECTORIES = 3
 
 
 class System(Protocol):
-    """What the integrator needs to know of a model with its parameters (see `models`)."""
+    """What the integrator needs of a model with its parameters (see `models`)."""
 
     @property
     def n_rows(self) -> int: ...
@@ -63,7 +64,7 @@ class System(Protocol):
 class Control:
     """How to integrate and where to sample.
 
-    Samples are taken at ``start + i * step`` as far as ``t_end``.
+    Samples are taken at ``start + i * step`` up to ``t_end``.
     """
 
     t_end: float
@@ -78,7 +79,7 @@ class Control:
     @property
     def n_samples(self) -> int:
         """Number of sampling times."""
-        # A step that fits but for rounding counts: (1000 - 950) / 0.01 is a hair below 5000.
+        # Tolerates rounding: (1000 - 950) / 0.01 is slightly less than 5000.
         return int((self.t_end - self.start) / self.step + 1e-6) + 1
 
     @property
@@ -90,12 +91,11 @@ class Control:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One trajectory's end: status, work done, sampled rows and last state.
+    """Result of one trajectory: status, work done, sampled rows and last state.
 
-    ``samples`` (n_observed, n_samples) is a view, time by time in memory, of a buffer that is used
-    again, by later calls of `integrate` too: take what is needed before returning; ``n_sampled`` of
-    its columns were reached.
-    ``status`` is DONE or one of the integrator's failures.
+    ``samples`` (n_observed, n_samples) is a view of a buffer, contiguous in the observed rows. The
+    buffer is used again, also by later calls of `integrate`, so copy it if it is needed later. The
+    first ``n_sampled`` columns are valid. ``status`` is DONE or a failure of the integrator.
     """
 
     status: Status
@@ -111,9 +111,10 @@ class Stopped(Exception):
 
 
 class LanePool:
-    """The lanes of the stepping loop and what each of them works on.
+    """The lanes of the stepping loop and the trajectory in each of them.
 
-    ``samples`` (lanes, n_samples, width) is room for samples in whole vectors; new by default.
+    ``samples`` (lanes, n_samples, width) is a buffer for samples in whole vectors. Default: a new
+    one.
     """
 
     def __init__(
@@ -125,8 +126,8 @@ class LanePool:
         samples: Array | None = None,
     ) -> None:
         m, c = control.method, control
-        # A single lane has its rows in vectors; rows of zeros fill the last one. Samples are
-        # written in vectors from any number of lanes.
+        # The rows of a single lane are in vectors, and rows of zeros fill the last vector. Samples
+        # are written in vectors for any number of lanes.
         self.size = system.n_rows
         width = _whole_vectors(n_observed)
         rows = _whole_vectors(self.size) if lanes == 1 else max(self.size, width)
@@ -159,7 +160,7 @@ class LanePool:
         self.iterations = min(max(FIRST_WORK // (rows * lanes), 1), FIRST_STEPS)
 
     def put(self, m: int, y0: Array, params: Array) -> None:
-        """Begin a trajectory in lane ``m``."""
+        """Start a trajectory in lane ``m``."""
         lanes = self.lanes
         lanes.y[: self.size, m] = y0
         self.params[:, m] = params
@@ -177,13 +178,13 @@ class LanePool:
         return samples
 
     def clear(self, m: int) -> None:
-        """Empty lane ``m``: zeros everywhere, so that it computes zeros until it is used again."""
+        """Fill lane ``m`` with zeros, so that it computes zeros until it is used again."""
         lanes = self.lanes
         lanes.y[:, m] = lanes.y1[:, m] = lanes.k[:, m] = lanes.lane[:, m] = 0.0
         lanes.counters[STATE, m] = IDLE
 
     def run(self) -> float:
-        """Call the compiled loop once; returns the wall time it took, seconds."""
+        """Call the compiled loop once. Returns its wall time in seconds."""
         began = time.perf_counter()
         done = self.advance(
             self.rhs,
@@ -202,7 +203,7 @@ class LanePool:
         return elapsed
 
     def outcome(self, m: int, status: Status, elapsed: float) -> Outcome:
-        """Return the end of the trajectory in lane ``m``, after ``elapsed`` seconds."""
+        """Return the result of the trajectory in lane ``m``, which took ``elapsed`` seconds."""
         return Outcome(
             status,
             steps=int(self.lanes.counters[ACCEPTED, m]),
@@ -220,7 +221,7 @@ def _whole_vectors(n: int) -> int:
 def choose_lanes(
     n_trajectories: int, n_rows: int, stages: int, n_observed: int, n_samples: int
 ) -> int:
-    """Return 1 or `LANES`, from the number of trajectories and the memory that they take."""
+    """Return 1 or `LANES`, from the number of trajectories and the memory that they need."""
     fits = LANES * _whole_vectors(n_observed) * n_samples * 8 <= SAMPLE_BYTES
     fits = fits and LANES * (stages + 3) * n_rows * 8 <= VECTOR_BYTES
     return LANES if n_trajectories >= VECTOR_TRAJECTORIES and fits else 1
@@ -244,29 +245,29 @@ def integrate(
     systems : sequence
         One per trajectory, equal in right-hand side and integer parameters.
     states : sequence of shape (n_rows,)
-        Initial states, or a function of the trajectory's number that gives it.
+        Initial states, or a function that returns the state for the number of a trajectory.
     control : Control
     n_observed : int
         The first ``n_observed`` rows are sampled.
     on_end : callable
         Called with (number, `Outcome`) as each trajectory ends, in order of ending.
     should_stop : callable, optional
-        Asked about ten times a second.
+        Called about ten times per second. If it returns true, `Stopped` is raised.
     lanes : int, optional
-        1 or `LANES`; chosen from the work by default.
+        1 or `LANES`. Default: see `choose_lanes`.
 
     Raises
     ------
     Stopped
-        When ``should_stop`` said so.
+        ``should_stop`` returned true.
     """
     if not systems:
         return
     initial = states if callable(states) else states.__getitem__
     rows, stages = systems[0].n_rows, control.method.stages
     width = lanes or choose_lanes(len(systems), rows, stages, n_observed, control.n_samples)
-    # Only the buffer of several lanes is used again: `choose_lanes` bounds its size. The samples of
-    # a single trajectory may have any size, and `simulate` returns them.
+    # Only the buffer of several lanes is used again, since `choose_lanes` limits its size. The
+    # samples of a single trajectory may have any size, and `simulate` returns them.
     shape = width, control.n_samples, _whole_vectors(n_observed)
     with nullcontext() if width == 1 else scratch_buffer(*shape) as samples:
         pool = LanePool(width, systems[0], control, n_observed, samples)

@@ -1,4 +1,4 @@
-"""Memory that the stepping loop works on."""
+"""Scratch memory of the stepping loop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def aligned(*shape: int, fill: Callable[[int], Array] = np.zeros) -> Array:
-    """Return zeros, or what `fill` gives, from the start of a cache line on."""
+    """Return an array, aligned to a cache line, of zeros or of what `fill` gives."""
     size = int(np.prod(shape))
     raw = fill(size + 8)
     offset = (-raw.ctypes.data // 8) % 8
@@ -29,10 +29,10 @@ _kept = _Kept()
 
 @contextmanager
 def scratch_buffer(*shape: int) -> Iterator[Array]:
-    """Provide an array with arbitrary contents; this thread gets the same memory the next time.
+    """Provide an array with arbitrary contents. Each thread uses the same memory again.
 
-    New memory comes from the system page by page, at the first write to each page, and that takes
-    time. A second request while the buffer is in use gets memory of its own.
+    The system provides new memory at the first write to each page, which takes time. A second
+    request while the buffer is in use gets new memory.
     """
     size = int(np.prod(shape))
     buffer, _kept.buffer = _kept.buffer, None

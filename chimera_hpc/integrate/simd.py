@@ -1,14 +1,14 @@
-"""SIMD vectors: `LANES` float64 that one instruction works on.
+"""SIMD vectors: `LANES` float64 that one instruction processes.
 
-A kernel is written once, over numbers. Called with a ``float`` it works on one trajectory; called
-with a vector it works on `LANES` of them, lane by lane, with the same IEEE operations in the same
-order. That is why a trajectory has the same bits whatever its lane and its neighbours.
+A kernel is written once, for numbers. Called with a ``float``, it computes one trajectory. Called
+with a vector, it computes `LANES` of them, lane by lane, with the same IEEE operations in the same
+order. The bits of a trajectory therefore do not depend on its lane or on the other lanes.
 
-Arrays are (rows, lanes), C-contiguous. ``load(like, array, row)`` reads row ``row`` as the kind of
-number that ``like`` is; ``store(array, row, value)`` writes it. A single trajectory has its rows
-one after the other in memory. There a vector is eight neighbouring rows, which `load_at`,
-`load_some` and their partners address by offset. Sums over rows go to eight partial sums (`fold`)
-or through three levels (`SCAN`): an order that vectors of lanes and vectors of rows can share.
+Arrays are (rows, lanes), C-contiguous. ``load(like, array, row)`` reads row ``row`` as the type of
+``like``; ``store(array, row, value)`` writes it. The rows of a single trajectory are contiguous in
+memory. A vector is then eight neighbouring rows, which `load_at`, `load_some` and the matching
+stores address by offset. Sums over rows use eight partial sums (`fold`) or three levels (`SCAN`),
+so vectors of lanes and vectors of rows add in the same order.
 
 With ``NUMBA_DISABLE_JIT=1`` a vector is a NumPy array of `LANES` numbers (`simd_numpy`), otherwise
 it is an LLVM vector (`simd_llvm`). The two modules have the same functions.

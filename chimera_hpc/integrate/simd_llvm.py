@@ -35,16 +35,17 @@ class _VectorModel(models.PrimitiveModel):
 
 
 def _places(numbers):
-    """Return a constant vector of places, as LLVM's shuffles take it."""
+    """Return a constant vector of indices for LLVM's shuffles."""
     numbers = list(numbers)
     return ir.Constant(ir.VectorType(_INT32, len(numbers)), numbers)
 
 
 def _pointer(context, builder, signature, args, kind, first=0):
-    """Return a pointer into an array (rows, lanes), argument ``first``, at the place after it.
+    """Return a pointer into an array (rows, lanes).
 
-    ``kind`` is what the place counts and what is there: "number" and "vector" count numbers,
-    "row" counts rows that are vectors.
+    The array is argument ``first``, the offset is the argument after it. With ``kind`` "number" or
+    "vector", the offset counts numbers and the pointer is to that type. With "row", the offset
+    counts rows, which are vectors.
     """
     array_type, at_type = signature.args[first : first + 2]
     offset = context.cast(builder, args[first + 1], at_type, types.intp)
@@ -67,7 +68,7 @@ def _broadcast(builder, number):
 
 
 def _places_from(builder, condition, number):
-    """Return the mask of the places j with ``j condition number``."""
+    """Return the mask of the elements j with ``j condition number``."""
     places = ir.Constant(ir.VectorType(_INT64, LANES), list(range(LANES)))
     return builder.icmp_signed(condition, places, _broadcast(builder, number))
 
@@ -90,7 +91,7 @@ def broadcast(typing_context, value):
 
 @intrinsic
 def load(typing_context, like, array, row):
-    """Read row ``row`` of ``array`` (rows, lanes) as the kind of number ``like`` is."""
+    """Read row ``row`` of ``array`` (rows, lanes) as the type of ``like``."""
 
     def generate(context, builder, signature, args):
         pointer = _pointer(context, builder, signature, args, _kind_of(like), first=1)
@@ -114,7 +115,7 @@ def store(typing_context, array, row, value):
 
 @intrinsic
 def across(typing_context, like, array, row):
-    """Read the lanes' numbers as a vector; the number of a single lane fills all places."""
+    """Read the lanes' numbers as a vector. The number of a single lane is broadcast."""
 
     def generate(context, builder, signature, args):
         kind = _kind_of(like)
@@ -127,7 +128,7 @@ def across(typing_context, like, array, row):
 
 @intrinsic
 def load_at(typing_context, array, offset):
-    """Read `LANES` neighbours from the numbers of ``array`` in the order of memory."""
+    """Read `LANES` contiguous numbers of ``array``."""
 
     def generate(context, builder, signature, args):
         pointer = _pointer(context, builder, signature, args, "vector")
@@ -138,7 +139,7 @@ def load_at(typing_context, array, offset):
 
 @intrinsic
 def store_at(typing_context, array, offset, vector):
-    """Write a vector over neighbours among the numbers of ``array`` in the order of memory."""
+    """Write a vector to contiguous numbers of ``array``."""
 
     def generate(context, builder, signature, args):
         pointer = _pointer(context, builder, signature, args, "vector")
@@ -150,7 +151,7 @@ def store_at(typing_context, array, offset, vector):
 
 @intrinsic
 def stream_at(typing_context, array, offset, vector):
-    """Write as `store_at` does, past the caches; the place must begin a cache line."""
+    """Write as `store_at` does, but bypass the caches. The address must start a cache line."""
 
     def generate(context, builder, signature, args):
         pointer = _pointer(context, builder, signature, args, "vector")
@@ -163,12 +164,12 @@ def stream_at(typing_context, array, offset, vector):
 
 @intrinsic
 def prefetch(typing_context, like, array, row):
-    """Bring row ``row``, which need not exist, into the first cache."""
+    """Prefetch row ``row``, which need not exist, into the first-level cache."""
 
     def generate(context, builder, signature, args):
         pointer = _pointer(context, builder, signature, args, _kind_of(like), first=1)
         pointer = builder.bitcast(pointer, ir.IntType(8).as_pointer())
-        # To be read, kept in all caches, data: what a processor has of its own it may write.
+        # Arguments of llvm.prefetch: for reading (0), in all cache levels (3), data (1).
         options = [_INT32(option) for option in (0, 3, 1)]
         _call(builder, "llvm.prefetch.p0", ir.VoidType(), [pointer, *options])
         return context.get_dummy_value()
@@ -178,7 +179,7 @@ def prefetch(typing_context, like, array, row):
 
 @intrinsic
 def load_some(typing_context, array, offset, low, high):
-    """Read places ``low <= j < high`` of a vector as `load_at` does; -0.0 elsewhere."""
+    """Read elements ``low <= j < high`` of a vector as `load_at` does; -0.0 elsewhere."""
 
     def generate(context, builder, signature, args):
         pointer = _pointer(context, builder, signature, args, "vector")
@@ -193,7 +194,7 @@ def load_some(typing_context, array, offset, low, high):
 
 @intrinsic
 def store_some(typing_context, array, offset, vector, count):
-    """Write the first ``count`` places of a vector as `store_at` does."""
+    """Write the first ``count`` elements of a vector as `store_at` does."""
 
     def generate(context, builder, signature, args):
         count = context.cast(builder, args[3], signature.args[3], types.intp)
@@ -218,7 +219,7 @@ def add_shifted(typing_context, vector, level):
 
 @intrinsic
 def last_of(typing_context, vector):
-    """Return the number in the last place of a vector."""
+    """Return the last element of a vector."""
 
     def generate(context, builder, signature, args):
         return builder.extract_element(args[0], _INT32(LANES - 1))
@@ -244,13 +245,13 @@ def fold(typing_context, vector):
 
 @intrinsic
 def transposed(typing_context, vectors):
-    """Transpose eight vectors: vector m of the result holds place m of each."""
+    """Transpose eight vectors: vector m of the result holds element m of each."""
 
     def generate(context, builder, signature, args):
         rows = cgutils.unpack_tuple(builder, args[0], LANES)
         for width in (1, 2, 4):
-            # Blocks of `width` places change sides between rows that are as far apart. Places from
-            # `LANES` on are those of the higher row.
+            # Swaps blocks of `width` elements between rows that are `width` apart. Indices from
+            # `LANES` on refer to the higher row.
             low = [place & ~width | (LANES if place & width else 0) for place in range(LANES)]
             high = [place + width for place in low]
             for j in range(LANES):

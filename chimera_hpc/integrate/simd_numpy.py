@@ -13,7 +13,7 @@ def broadcast(value):
 
 
 def load(like, array, row):
-    """Read row ``row`` of ``array`` (rows, lanes) as the kind of number ``like`` is."""
+    """Read row ``row`` of ``array`` (rows, lanes) as the type of ``like``."""
     return array[row, 0] if np.ndim(like) == 0 else load_at(array, row * LANES)
 
 
@@ -26,29 +26,29 @@ def store(array, row, value):
 
 
 def across(like, array, row):
-    """Read the lanes' numbers as a vector; the number of a single lane fills all places."""
+    """Read the lanes' numbers as a vector. The number of a single lane is broadcast."""
     return np.full(LANES, array[row, 0]) if np.ndim(like) == 0 else array[row].copy()
 
 
 def load_at(array, offset):
-    """Read `LANES` neighbours from the numbers of ``array`` in the order of memory."""
+    """Read `LANES` contiguous numbers of ``array``."""
     return array.reshape(-1)[offset : offset + LANES].copy()
 
 
 def store_at(array, offset, vector):
-    """Write a vector over neighbours among the numbers of ``array`` in the order of memory."""
+    """Write a vector to contiguous numbers of ``array``."""
     array.reshape(-1)[offset : offset + LANES] = vector
 
 
 def load_some(array, offset, low, high):
-    """Read places ``low <= j < high`` of a vector as `load_at` does; -0.0 elsewhere."""
+    """Read elements ``low <= j < high`` of a vector as `load_at` does; -0.0 elsewhere."""
     vector = np.full(LANES, -0.0)
     vector[low:high] = array.reshape(-1)[offset + low : offset + high]
     return vector
 
 
 def store_some(array, offset, vector, count):
-    """Write the first ``count`` places of a vector as `store_at` does."""
+    """Write the first ``count`` elements of a vector as `store_at` does."""
     array.reshape(-1)[offset : offset + count] = vector[:count]
 
 
@@ -59,7 +59,7 @@ def add_shifted(vector, level):
 
 
 def last_of(vector):
-    """Return the number in the last place of a vector."""
+    """Return the last element of a vector."""
     return vector[LANES - 1]
 
 
@@ -71,16 +71,16 @@ def fold(vector):
 
 
 def stream_at(array, offset, vector):
-    """Write as `store_at` does, past the caches; the place must begin a cache line."""
+    """Write as `store_at` does, but bypass the caches. The address must start a cache line."""
     store_at(array, offset, vector)
 
 
 def prefetch(like, array, row):
-    """Bring row ``row``, which need not exist, into the first cache."""
+    """Prefetch row ``row``, which need not exist, into the first-level cache."""
 
 
 def transposed(vectors):
-    """Transpose eight vectors: vector m of the result holds place m of each."""
+    """Transpose eight vectors: vector m of the result holds element m of each."""
     return tuple(np.stack(vectors).T.copy())
 
 

@@ -1,6 +1,6 @@
 """Weighted sums over the stages of a step: the state of the next stage, the error of the step.
 
-Arrays and notation as in `stepper` and `arguments`. A sum works on one unit at a time: a row of
+Arrays and notation as in `stepper` and `arguments`. A sum processes one unit at a time: a row of
 eight lanes, or eight rows of one lane.
 """
 
@@ -12,8 +12,8 @@ from chimera_hpc.integrate.simd import broadcast, fma, fold, larger, load, magni
 @jit()
 def stage_sum(h, step, a, s):
     """Write ``y1 = y + h * sum_{j < s} a[s, j] k_j``, the state at which stage s is the slope."""
-    # Written out up to six terms so that the compiler keeps the weights in registers. The rows go
-    # downwards, those of a right-hand side upwards: each finds in the cache what the other left.
+    # Written out up to six terms so that the compiler keeps the weights in registers. This loop
+    # goes down the rows and a right-hand side goes up, so each starts with rows that are cached.
     y, out, k, first, units = step
     o0 = first
     if s == 1:
@@ -87,8 +87,8 @@ def _add_to_both(total, error, a, e, stage):
 def last_stage_sum(h, step, a, e):
     """Write the new state as `stage_sum` does, and its error estimate without the last stage.
 
-    The stages are read once for both. The estimate ``sum_{j < s} e_j k_j`` stands behind the stages
-    in ``k``; the last stage, the slope at the new state, is not known yet.
+    The stages are read once for both. The estimate ``sum_{j < s} e_j k_j`` is stored after the
+    stages in ``k``. The last stage, the slope at the new state, is not known yet.
     """
     y, out, k, first, units = step
     s = e.size - 1
@@ -132,8 +132,8 @@ def _add_square(total, ratio):
 
 @jit(inline="always")
 def _add_up(zero, context, units, lane):
-    # Rows go to eight partial sums in turn, which are then folded in halves. A single lane has its
-    # eight sums side by side in a vector.
+    # Rows are added to eight partial sums in turn, which are then folded in halves. The eight sums
+    # of a single lane form a vector.
     if lane.shape[1] == 1:
         total = broadcast(0.0)
         for i in range(units):
@@ -166,8 +166,8 @@ def _add_up(zero, context, units, lane):
 def error_sum(zero, h, step, e, limits, lane):
     """Sum ``(err_i / (atol + rtol max(|y_i|, |y1_i|)))**2`` over the rows, HNW eq. II.4.11.
 
-    The error estimate is what `last_stage_sum` left plus the last stage's part. The sum goes to the
-    row `ERROR_SUM` of ``lane``.
+    The error estimate is that of `last_stage_sum` plus the part of the last stage. The sum is
+    written to the row `ERROR_SUM` of ``lane``.
     """
     s = e.size - 1
     places = s * step.units - step.first, (s + 1) * step.units

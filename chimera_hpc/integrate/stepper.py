@@ -1,13 +1,13 @@
 """The compiled stepping loop: `LANES` trajectories, or one, in lock step.
 
-Each lane has its own time, step size and status; all of them go through the stages together.
-Nothing is allocated here and nothing raises: a lane that can't go on gets a status.
+Each lane has its own time, step size and status. All lanes compute a stage together. The loop
+allocates no memory and raises no exception: a lane that fails gets a status.
 
 Notation of Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I* (HNW),
 secs. II.4 and II.6: ``y`` and ``y1`` are the states before and after the step, ``k`` holds the
-stages one after the other, rows ``j * rows ... (j + 1) * rows - 1`` being stage j. The first stage
-of a step is the last of the one before; instead of a copy, the two change places (``first``).
-Behind the stages is room for the errors of the rows. The arguments are in `arguments`.
+stages in order: rows ``j * rows ... (j + 1) * rows - 1`` are stage j. The first stage of a step is
+the last of the previous one. The two are swapped by the offset ``first`` instead of a copy. The
+errors of the rows are stored after the stages. See `arguments` for the arguments.
 """
 
 import math
@@ -37,7 +37,7 @@ from chimera_hpc.integrate.simd import LANES, across, broadcast
 from chimera_hpc.integrate.stages import error_sum, last_stage_sum, stage_sum
 
 # PI control (HNW sec. IV.2): the next step is h * SAFETY * err**(-EXPONENT / order) *
-# err_before**(MEMORY / order), the factor kept within [SMALLEST, LARGEST].
+# err_before**(MEMORY / order), with the factor clipped to [SMALLEST, LARGEST].
 SAFETY, SMALLEST, LARGEST, EXPONENT, MEMORY = 0.9, 0.2, 10.0, 0.7, 0.4
 LOG_ERROR_FLOOR = math.log(1e-4)
 
@@ -65,8 +65,8 @@ def _scaled_norm(rows, first, y, m, size, limits):
 
 @jit()
 def _start(rhs, inputs, lanes, limits, order):
-    # First derivative and first step size of the lanes just put in, HNW sec. II.4 ("Starting
-    # step size"); the rows of the other lanes are not touched.
+    # First derivative and first step size of new lanes, HNW sec. II.4 ("Starting step size"). The
+    # rows of other lanes do not change.
     params, ints, size = inputs
     y, y1, k, lane, count = lanes.y, lanes.y1, lanes.k, lanes.lane, lanes.counters
     rows, n_lanes = y.shape
@@ -104,7 +104,7 @@ def _start(rhs, inputs, lanes, limits, order):
 
 @jit()
 def _judge(lane, count, size, t_end):
-    # Accept or reject the step of each running lane; returns the number of lanes rejected.
+    # Accept or reject the step of each running lane. Returns the number of rejected lanes.
     rejected = 0
     for m in range(lane.shape[1]):
         if count[STATE, m] != RUNNING:
@@ -128,7 +128,7 @@ def _judge(lane, count, size, t_end):
 
 @jit()
 def _next_step(lane, count, m, order, limits):
-    # Move lane m on and choose its next step size, or end it.
+    # Advance lane m and choose its next step size, or end it.
     t_end = limits.t_end
     log_error = lane[LOG_ERROR_NEW, m]
     if log_error <= 0.0:
@@ -153,7 +153,7 @@ def _next_step(lane, count, m, order, limits):
             count[STATE, m] = _STEP_TOO_SMALL if math.isfinite(log_error) else _NON_FINITE
         elif count[TRIED, m] >= limits.max_steps:
             count[STATE, m] = _STEP_BUDGET
-    # A step that would end just short of t_end is stretched to it: no sliver is left over.
+    # A step that would end just before t_end is extended to it, to avoid a tiny last step.
     if t + 1.01 * h >= t_end:
         h = t_end - t
     lane[STEP, m] = h if count[STATE, m] == RUNNING else 0.0
@@ -161,7 +161,7 @@ def _next_step(lane, count, m, order, limits):
 
 @jit()
 def _undo(y, y1, k, first, last, m, size):
-    # A rejected step of lane m: state and slope at its end are those at its beginning.
+    # Undo the rejected step of lane m: reset the state and slope to those before the step.
     for i in range(size):
         y1[i, m] = y[i, m]
         k[last + i, m] = k[first + i, m]
@@ -169,7 +169,7 @@ def _undo(y, y1, k, first, last, m, size):
 
 @jit()
 def _copy(source, first, target):
-    # Rows of ``source`` from ``first`` on to ``target``, as many as those have.
+    # Copy rows of ``source`` from ``first`` on into ``target``, as many as ``target`` has.
     for i in range(target.shape[0]):
         for m in range(target.shape[1]):
             target[i, m] = source[first + i, m]
@@ -221,7 +221,7 @@ def _advance(like, rhs, inputs, lanes, method, limits, iterations):
         swapped = not swapped
         first = last
         done += 1
-    # Hand the state back where it came from.
+    # The caller expects the state in its own arrays.
     if swapped:
         _copy(y, 0, y1)
     if first != 0:
@@ -257,12 +257,12 @@ def _advance_vector(rhs, params, ints, lanes, method, limits, size, iterations):
 
 @cache
 def advance(lanes):
-    """Stepping loop for one lane or for `LANES` lanes; compiled, or read from disk, at first use.
+    """Return the stepping loop for 1 or `LANES` lanes, compiled or read from disk at first use.
 
     ``advance(n)(rhs, params, ints, lanes, method, limits, size, iterations)`` tries at most
-    ``iterations`` steps in every running lane and returns as soon as a lane has ended; it returns
-    how many it tried. Lanes marked `FRESH` are started first: first derivative, first step size.
-    ``size`` is the number of rows of the state that the right-hand side sees.
+    ``iterations`` steps in every running lane. It returns the number of tried steps as soon as a
+    lane has ended. For `FRESH` lanes, it first computes the first derivative and step size.
+    ``size`` is the number of rows of the state that the right-hand side gets.
     """
     if lanes not in (1, LANES):
         raise ValueError(f"the stepping loop is compiled for 1 and {LANES} lanes, not {lanes}")

@@ -1,4 +1,4 @@
-"""A Runge-Kutta method is data: its Butcher tableau and its interpolant."""
+"""Runge-Kutta methods as data: Butcher tableau and interpolant."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Tableau:
         e_{n+1} = h \sum_i e_i k_i, \qquad
         y(t_n + \theta h) = y_n + h \sum_i k_i \sum_d p_{id} \theta^{d+1}.
 
-    The driver takes every method in the form "first same as last": the last stage is the
-    derivative at the new point. A method without that property states it by a last row of ``a``
-    equal to its weights, with ``b``, ``e`` and ``p`` zero there.
+    Every method has the form "first same as last": the last stage is the derivative at the new
+    point. For a method without this property, append its weights as a last row of ``a``, with
+    zeros in ``b``, ``e`` and ``p``.
 
     Parameters
     ----------
     name : str
-        How job files call it.
+        Name in job files.
     order : int
-        Order of the solution that is carried on.
+        Order of the solution that is propagated.
     error_order : int
         Order of the embedded solution.
     a : shape (s, s)
@@ -48,7 +48,7 @@ class Tableau:
     Raises
     ------
     ValueError
-        When the coefficients contradict each other.
+        The coefficients contradict each other.
 
     References
     ----------
@@ -65,7 +65,7 @@ class Tableau:
     source: str
 
     def __post_init__(self) -> None:
-        """Check shapes and the identities that hold for every method."""
+        """Check the shapes and the identities that hold for every method."""
         s = self.a.shape[0]
         if self.a.shape != (s, s) or self.e.shape != (s,) or self.p.shape[0] != s:
             raise ValueError(f"{self.name}: shapes of the tableau differ")
@@ -78,7 +78,7 @@ class Tableau:
 
     @property
     def stages(self) -> int:
-        """Number of stages, the derivative at the new point included."""
+        """Number of stages, including the derivative at the new point."""
         return int(self.a.shape[0])
 
     @cached_property
@@ -95,7 +95,7 @@ class Tableau:
 
 
 def lower_triangular(*rows: tuple[float, ...]) -> Coefficients:
-    """Square matrix of coefficients from its rows below the diagonal.
+    """Return a square matrix of coefficients from its rows below the diagonal.
 
     >>> lower_triangular((0.5,), (0.0, 1.0))
     array([[0. , 0. , 0. ],
@@ -109,9 +109,9 @@ def lower_triangular(*rows: tuple[float, ...]) -> Coefficients:
 
 
 def hermite(b: Coefficients) -> Coefficients:
-    """Weights p of the cubic that has the step's states and slopes at both ends, order 3.
+    """Return the weights p of the cubic Hermite interpolant of a step (order 3).
 
-    ``b`` are the weights of the solution, whose last stage is the slope at the new point (HNW
+    ``b`` are the weights of the solution. The last stage must be the slope at the new point (HNW
     sec. II.6, eq. 6.7).
 
     >>> hermite(np.array([0.5, 0.5, 0.0]))

@@ -1,4 +1,4 @@
-"""Tsitouras 5(4), the method that the paper names."""
+"""Tsitouras 5(4), the method of the paper."""
 
 import numpy as np
 

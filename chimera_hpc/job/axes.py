@@ -1,4 +1,4 @@
-"""Axes of a grid: what a job file may write for one, and the values that it means.
+"""Axes of a grid: how a job file writes an axis, and which values it means.
 
 ====================================  ==============================================================
 written                               meaning
@@ -8,11 +8,11 @@ written                               meaning
 ``"2:24"``, ``"0.1:0.9:0.2"``         range ``a:b`` or ``a:b:step``, both ends included
 ``{ linspace = [0.01, 0.1, 19] }``    19 equally spaced values from 0.01 to 0.1
 ``"P"``                               equal to the axis (or fixed parameter) P
-``"0:P"``, ``"0:P:2"``                dependent range: for each P its own, ends included
+``"0:P"``, ``"0:P:2"``                range that depends on P, both ends included
 ====================================  ==============================================================
 
-Ranges and linspace are computed in exact fractions of the decimals as written, then rounded once:
-``"0:1:0.1"`` holds 0.3, not 0.30000000000000004, and equals the list that a person would write.
+Ranges and linspace are computed exactly, as fractions of the written decimals, then rounded once:
+``"0:1:0.1"`` holds 0.3, not 0.30000000000000004, and equals the list ``[0, 0.1, 0.2, ...]``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from chimera_hpc.base.wording import short
 from chimera_hpc.models.parameters import Parameter
 
 MAX_FLOATS = 10**6
-"""Most values of one axis of fractions (integer ranges are never listed, so need no bound)."""
+"""Most values of one axis of fractions. Integer ranges are never listed and need no bound."""
 
 _NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
@@ -41,7 +41,7 @@ _SYNTAX = 'a value, a list, "a:b", "a:b:step", "P", "0:P" or { linspace = [a, b,
 
 @dataclass(frozen=True)
 class Values:
-    """An axis of its own: the values in order, integers or floats."""
+    """An independent axis: the values in order, integers or floats."""
 
     values: range | tuple[float, ...]
 
@@ -71,8 +71,8 @@ Axis = Values | Same | Between
 def parse_axis(raw: Any, parameter: Parameter) -> Axis:
     """Return the axis that a job file means by `raw`.
 
-    Raises BadInput (without the name of the axis) for anything else than the module's table, for an
-    empty axis, a value twice, and values that `parameter` does not allow.
+    Raises BadInput (without the name of the axis) for a form that is not in the table above, an
+    empty axis, a repeated value, and a value that `parameter` does not allow.
     """
     if isinstance(raw, str):
         axis = _from_text(raw, parameter)
@@ -90,8 +90,7 @@ def parse_axis(raw: Any, parameter: Parameter) -> Axis:
 def resolve(axis: Axis, fixed: Mapping[str, int | float], parameter: Parameter) -> Axis:
     """Return the axis with every name of a fixed parameter replaced by its value.
 
-    Raises BadInput when the value does not fit: a fraction as the end of a range, an axis that
-    becomes empty.
+    Raises BadInput if the end of a range becomes a fraction, or if the axis becomes empty.
     """
     if isinstance(axis, Same) and axis.name in fixed:
         return Values((parameter.check(fixed[axis.name]),))
@@ -114,10 +113,10 @@ def references(axis: Axis) -> tuple[str, ...]:
 
 
 def normal_form(axis: Axis) -> str | list[int] | list[float]:
-    """Return the one way to write the axis: equal for axes that mean the same.
+    """Return the normal form of the axis, which is the same for equal axes.
 
-    Three and more integers in equal rising steps are ``a:b`` or ``a:b:step``, other values a list,
-    dependent axes their text without blanks.
+    Three or more integers in equal increasing steps become ``a:b`` or ``a:b:step``. Other values
+    become a list. A dependent axis becomes its text without blanks.
     """
     if not isinstance(axis, Values):
         return str(axis) if isinstance(axis, Between) else axis.name
@@ -188,7 +187,7 @@ def _floats(low: Fraction, high: Fraction, step: Fraction) -> tuple[float, ...]:
         raise BadInput(f"{short(count)} values are too many, at most {MAX_FLOATS} are allowed")
     scale = math.lcm(low.denominator, step.denominator)
     first, increment = int(low * scale), int(step * scale)
-    # the division of two integers rounds once, to nearest
+    # Python rounds the division of two integers once, to nearest.
     return tuple((first + i * increment) / scale for i in range(count))
 
 

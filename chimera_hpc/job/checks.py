@@ -1,4 +1,4 @@
-"""What must hold between the keys of a job: known names, complete parameters, limits, size."""
+"""Checks across the keys of a job: known names, complete parameters, limits, size."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ MAX_SAMPLES = 10**9
 
 
 class Grid(dict[str, Any]):
-    """The table [grid] in normal form, `seeds` last, with the axes that were read from it."""
+    """The table [grid] in normal form, `seeds` last, with its parsed axes."""
 
     parsed: Mapping[str, Axis]
-    """By the names of the table, names of other parameters not yet replaced."""
+    """By the names in the table. References to other parameters are not yet replaced."""
 
     @classmethod
     def of(cls, model: ModelParameters, raw: Mapping[str, Any]) -> Grid:
-        """Read every axis once; `seeds` is 1 when missing; BadInput for a wrong axis."""
+        """Parse every axis once; `seeds` defaults to 1. Raises BadInput for a wrong axis."""
         if "n_nodes" in raw:
             raise BadInput("grid.n_nodes: one for a whole sweep; set it in [fixed]")
         parsed = {
@@ -55,7 +55,7 @@ def parsed(grid: Mapping[str, Any]) -> Mapping[str, Axis]:
 def complete_fixed(
     model: ModelParameters, fixed: Mapping[str, Any], axes: Mapping[str, Any]
 ) -> Fixed:
-    """Return n_nodes and every parameter that is not an axis, defaults filled in."""
+    """Return n_nodes and every parameter that is not an axis, with defaults."""
     known = {parameter.name: parameter for parameter in (model.n_nodes, *model.parameters)}
     for name in fixed:
         if name not in known:
@@ -78,9 +78,10 @@ def complete_fixed(
 
 
 def axes_of(model: ModelParameters, grid: Mapping[str, Axis], fixed: Fixed) -> dict[str, Axis]:
-    """Return the axes by the name of their column, names of fixed parameters replaced, `seed` last.
+    """Return the axes by the name of their column, `seed` last.
 
-    Raises BadInput for a name that is neither an axis nor fixed, or not of the right type.
+    References to fixed parameters are replaced by their values. Raises BadInput for a name that is
+    neither an axis nor fixed, or that has the wrong type.
     """
     axes: dict[str, Axis] = {}
     for name, read in grid.items():
@@ -99,7 +100,7 @@ def axes_of(model: ModelParameters, grid: Mapping[str, Axis], fixed: Fixed) -> d
 
 
 def axis_parameter(model: ModelParameters, name: str) -> Parameter:
-    """Return what an axis may be: a parameter of the model or the radius `delta`."""
+    """Return the parameters that an axis may have: those of the model and the radius `delta`."""
     parameter = DELTA if name == "delta" else model.find(name)
     if parameter is None:
         known = [*(p.name for p in model.parameters), "delta", "seeds"]
@@ -108,7 +109,7 @@ def axis_parameter(model: ModelParameters, name: str) -> Parameter:
 
 
 def parse_seeds(raw: Any) -> Values:
-    """Return the seeds of a count n (0 to n - 1), a list or a range; BadInput for others."""
+    """Return the seeds of a count n (0 to n - 1), a list or a range. Raises BadInput otherwise."""
     if type(raw) is int:
         return Values(range(int(_at("grid.seeds", SEED_COUNT.check, raw))))
     axis = _parse("seeds", raw, SEED)
@@ -122,8 +123,8 @@ def parse_seeds(raw: Any) -> Values:
 def check_points(model: ModelParameters, axes: Mapping[str, Axis], fixed: Fixed) -> None:
     """Raise BadInput for a point beyond the model's limits and for too many points.
 
-    Only the axes that limits and dependent axes speak of are multiplied out, so that a wrong grid
-    costs little.
+    Only the axes that occur in limits and in dependent axes are multiplied out, which keeps the
+    check of a very large grid cheap.
     """
     limited = {name for limit in model.limits for name in (limit.name, *limit.needs)}
     linked = {name for axis in axes.values() for name in references(axis)}
@@ -194,7 +195,7 @@ def _parse(name: str, raw: Any, parameter: Parameter) -> Axis:
 
 
 def _at(key: str, function: Callable[..., Result], *arguments: Any) -> Result:
-    """Call the function; put the key before the message of its BadInput."""
+    """Call the function. Put the key in front of the message of its BadInput."""
     try:
         return function(*arguments)
     except BadInput as error:

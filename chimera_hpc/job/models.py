@@ -1,4 +1,4 @@
-"""The model that a job names: one of the registry, or a user's own ``package.module:object``."""
+"""The model that a job names: one of the registry, or a user's ``package.module:object``."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _MODULE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 
 
 def model_kind(name: str) -> ModelKind:
-    """Return the model of this name; raise BadInput for a name that is not in the registry.
+    """Return the model of this name. Raises BadInput for a name that is not in the registry.
 
-    ``package.module:object`` is a user's own model, see `user_model`.
+    ``package.module:object`` is a user's model, see `user_model`.
     """
     if ":" in name:
         own: ModelKind = user_model(name)
@@ -36,7 +36,7 @@ def model_kind(name: str) -> ModelKind:
 
 
 def parameters_of(name: str) -> ModelParameters:
-    """Return the table of parameters of a model; raise BadInput as `model_kind` does."""
+    """Return the table of parameters of a model. Raises BadInput as `model_kind` does."""
     return model_kind(name).parameters
 
 
@@ -54,15 +54,15 @@ def build(sweep: Any, row: Mapping[str, int | float]) -> Model:
 def user_model(name: str) -> Any:
     """Return the object that ``package.module:object`` names.
 
-    It has ``parameters``, a `ModelParameters`, and ``build(sweep, row)``, which returns what
-    `chimera_hpc.models.protocol.Model` lists for the point with this row of columns: see
-    `chimera_hpc.models.custom.OwnModel`, which makes both. The module is imported from the Python
-    path, and after that from the folders of `look_in`, by the workers too.
+    The object has ``parameters``, a `ModelParameters`, and ``build(sweep, row)``, which returns a
+    `chimera_hpc.models.protocol.Model` for the point with this row of columns.
+    `chimera_hpc.models.custom.OwnModel` provides both. The module is searched for on the Python
+    path first, then in the folders of `look_in`, also by the workers.
 
     Raises
     ------
     BadInput
-        When there is no such module, it cannot be imported, or the object is not a model.
+        The module does not exist or cannot be imported, or the object is not a model.
     """
     module, _, attribute = name.partition(":")
     where = f"model: {short(name)}"
@@ -71,7 +71,7 @@ def user_model(name: str) -> Any:
     try:
         found = getattr(_import(module), attribute)
     except Exception as error:
-        # Whatever the user's module does when it is imported.
+        # The import of a user's module may raise any exception.
         text = " ".join(f"{type(error).__name__}: {error}".split())
         if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
             text += "; it must be in the job's folder, the current one, or on PYTHONPATH"
@@ -84,10 +84,10 @@ def user_model(name: str) -> Any:
 
 
 def _import(module: str) -> ModuleType:
-    """Import a module without leaving its bytecode on the disk.
+    """Import a module without writing its bytecode to the disk.
 
-    Python tells stale bytecode by the second of the last change and the size of the source: an edit
-    may escape it.
+    Python detects stale bytecode by the time of the last change, in whole seconds, and the size of
+    the source. It may miss an edit.
     """
     before = sys.dont_write_bytecode
     sys.dont_write_bytecode = True
@@ -99,14 +99,14 @@ def _import(module: str) -> ModuleType:
 
 
 def look_in(folder: str | Path) -> None:
-    """Have the modules of users' models looked for in this folder too, after all other places."""
+    """Append a folder to the places where modules of users' models are searched for."""
     place = str(Path(folder).absolute())
     if place not in sys.path:
         sys.path.append(place)
 
 
 def model_folder(model: str) -> str | None:
-    """Return the folder in which the module of a user's model was found; None for other models."""
+    """Return the folder that holds the module of a user's model; None for other models."""
     if ":" not in model:
         return None
     user_model(model)

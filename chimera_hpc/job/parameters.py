@@ -14,7 +14,7 @@ DELTA = Parameter("delta", float, None, "Radius of the ball of initial states.",
 
 
 def _schema(parameters: list[Parameter], axis: bool) -> dict[str, Any]:
-    """Return the JSON Schema of a table whose keys are these parameters, as numbers or as axes."""
+    """Return the JSON Schema of a table with these parameters as keys, for numbers or for axes."""
     properties: dict[str, Any] = {}
     for parameter in parameters:
         number: dict[str, Any] = {"type": "integer" if parameter.kind is int else "number"}

@@ -1,4 +1,4 @@
-"""Points of a sweep as columns: one array a quantity, never an object a point."""
+"""Points of a sweep as columns: one array per quantity."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Points:
         Every parameter of the model, `delta` and `seed`, whether an axis or fixed; int64 or
         float64, read-only.
     axes : tuple of str
-        Names of the columns that vary, first slowest; `seed` is the last one.
+        Names of the columns that vary. The first varies slowest; `seed` is the last.
     """
 
     columns: dict[str, Column]
@@ -46,7 +46,7 @@ class Points:
         return len(next(iter(self.columns.values())))
 
     def __getitem__(self, which: slice | NDArray[Any]) -> Points:
-        """Return the points of a slice, of an array of indices or of a mask, in its order."""
+        """Return the points of a slice, an array of indices or a mask, in its order."""
         return Points({name: column[which] for name, column in self.columns.items()}, self.axes)
 
     def row(self, i: int) -> dict[str, int | float]:
@@ -54,7 +54,7 @@ class Points:
         return {name: column[i].item() for name, column in self.columns.items()}
 
     def find(self, **values: float) -> NDArray[np.int64]:
-        """Return the indices of the points with exactly these values; BadInput for other names."""
+        """Return the indices of the points with these values. Raises BadInput for unknown names."""
         found = np.ones(len(self), dtype=bool)
         for name, value in values.items():
             if name not in self.columns:
@@ -63,14 +63,14 @@ class Points:
         return np.flatnonzero(found)
 
     def cells(self) -> tuple[NDArray[np.int64], dict[str, Column]]:
-        """Return the cells: the different combinations of all columns but the seed.
+        """Return the cells: the different combinations of all columns except the seed.
 
         Returns
         -------
         cell_id : ndarray of int64, shape (n_points,)
             Number of each point's cell; cells are numbered in the order of their first point.
         columns : dict of str to ndarray, shape (n_cells,)
-            The columns but the seed, once a cell.
+            The columns except the seed, one entry per cell.
         """
         code = np.zeros(len(self), dtype=np.int64)
         n_codes = min(1, len(self))
@@ -92,9 +92,10 @@ class Points:
 
 
 def dependency_order(axes: Mapping[str, Axis]) -> list[str]:
-    """Return the names so that each comes after those it depends on, otherwise as declared.
+    """Return the names sorted so that each comes after those it depends on.
 
-    Raises BadInput for a circle; every name must be an axis.
+    Otherwise, the order of declaration is kept. Every name must be an axis. Raises BadInput for a
+    circular dependency.
     """
     order: list[str] = []
     waiting = list(axes)
@@ -117,16 +118,16 @@ def expand(
     Parameters
     ----------
     axes : mapping of str to Axis
-        In order of declaration; a dependent axis takes, for each value of the axes it names, its
-        own values.
+        In order of declaration. The values of a dependent axis are computed for each value of the
+        axes it names.
     check : callable
-        Called with the name of each new column and the columns so far, in order of dependence: it
-        may raise before a later axis makes the product large.
+        Called with the name of each new column and the columns so far, in order of dependence. It
+        can raise before a later axis makes the product large.
 
     Raises
     ------
     BadInput
-        More than `MAX_POINTS` rows, a circle, or a dependent range that is empty somewhere.
+        More than `MAX_POINTS` rows, a circular dependency, or an empty dependent range.
     """
     order = dependency_order(axes)
     columns: dict[str, Column] = {}
@@ -147,7 +148,7 @@ def expand(
 def _extend(
     name: str, axis: Axis, columns: Mapping[str, Column], n_rows: int
 ) -> tuple[NDArray[np.int64], Column]:
-    """Return which old row each new row continues, and the new column."""
+    """Return the index of the old row that each new row extends, and the new column."""
     if isinstance(axis, Same):
         return np.arange(n_rows), columns[axis.name]
     if isinstance(axis, Values):
@@ -176,7 +177,7 @@ def as_array(axis: Values) -> Column:
 
 
 def _rank(axis: Axis, column: Column) -> NDArray[Any]:
-    """Return a number that rises with the place of each value on its axis."""
+    """Return a number that increases with the position of each value on its axis."""
     if not isinstance(axis, Values):
         return column
     values = as_array(axis)

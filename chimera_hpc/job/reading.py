@@ -28,7 +28,7 @@ def bad(where: str, text: str) -> BadInput:
 
 
 def read_text(path: str | Path) -> str:
-    """Return the text of a job file; BadInput when there is none to read."""
+    """Return the text of a job file. Raises BadInput if it cannot be read."""
     try:
         return Path(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -39,7 +39,7 @@ def read_text(path: str | Path) -> str:
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """Return the tables of TOML text; BadInput with line and column when it is not valid."""
+    """Return the tables of TOML text. Raises BadInput with line and column if it is invalid."""
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -47,12 +47,12 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def apply_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
-    """Return the data with each KEY=VALUE put in its place.
+    """Return the data with each KEY=VALUE applied.
 
     KEY is `table.key`, or a bare key: name, title, model; `seeds`; a parameter of the model; or a
-    key of exactly one other table. A parameter stays in [grid] if it is an axis and goes there if
-    the value is one (a list, a range, a name), else into [fixed]. VALUE is TOML, or bare text such
-    as 3:8, P or sine-fit.
+    key of exactly one other table. A parameter is set in [grid] if it is an axis already or if the
+    value is one (a list, a range, a name), else in [fixed]. VALUE is TOML, or bare text such as
+    3:8, P or sine-fit.
     """
     changed = {key: dict(v) if isinstance(v, dict) else v for key, v in data.items()}
     for override in overrides:
@@ -76,7 +76,7 @@ def _is_axis(value: Any) -> bool:
 
 
 def _place(data: dict[str, Any], dotted: str, override: str) -> tuple[str, str]:
-    """Return the table, made if missing, and the key that an override means."""
+    """Return the table (created if missing) and the key that an override sets."""
     table, _, key = dotted.rpartition(".")
     if not table and key in _TOP:
         return "", key
@@ -96,7 +96,7 @@ def _place(data: dict[str, Any], dotted: str, override: str) -> tuple[str, str]:
 
 
 def _table_of(data: Mapping[str, Any], key: str) -> str:
-    """Return the table besides [grid] and [fixed] that a bare key belongs to, or nothing."""
+    """Return the table, other than [grid] and [fixed], that has this bare key, if any."""
     new = renaming.FEATURES.get(key, key)
     homes = [name for name, table in TABLES.items() if new in table.model_fields]
     if len(homes) != 1 or key in {*data["grid"], *data["fixed"], "delta"}:
@@ -121,10 +121,10 @@ def _parse_value(text: str, override: str) -> Any:
 
 
 def one_line(error: ValidationError, known: list[str]) -> str:
-    """Return the most telling of pydantic's complaints as 'key: what is wrong', without the place.
+    """Return the most useful of pydantic's errors as 'key: what is wrong', without the place.
 
-    An unknown key comes first, since it is often the reason for a missing one. `known` are the keys
-    at the top.
+    An unknown key comes first, since it is often the reason for a missing one. `known` holds the
+    keys at the top level.
     """
     complaints = error.errors(include_url=False)
     first = min(complaints, key=lambda complaint: complaint["type"] != "extra_forbidden")

@@ -1,7 +1,7 @@
-"""The one registry: what a job may name, and where it is.
+"""The registry of what a job may name, and where it is.
 
-For developers: a model, a method, a measure, an analysis or a figure is one file and one line here,
-``name: "module:object"``. Nothing is imported before it is asked for.
+A new model, method, measure, analysis or figure needs one file and one line here,
+``name: "module:object"``. An object is imported at its first use.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ METHODS = {
 """Runge-Kutta pairs: `integrate.tableau.Tableau`."""
 
 REMOVED_METHODS = {"verner6": "tsit5", "kcl4": "tsit5"}
-"""Pairs of version 0.1, which a store may name, and what to use instead."""
+"""Pairs of version 0.1 that a store may still name, and what to use instead."""
 
 MEASURES = {
     "variations": "chimera_hpc.measures.scalars:VARIATIONS",
@@ -42,7 +42,7 @@ MEASURES = {
     "distance": "chimera_hpc.measures.scalars:DISTANCE",
     "local_sigma": "chimera_hpc.measures.scalars:LOCAL_SIGMA",
 }
-"""Numbers of a run: `measures.measure.Measure`."""
+"""Measures of a run: `measures.measure.Measure`."""
 
 DEFAULT_PANEL = (
     "variations",
@@ -53,7 +53,7 @@ DEFAULT_PANEL = (
     "distance",
     "local_sigma",
 )
-"""Measures of a job that names none; another default would be another digest."""
+"""Measures of a job that names none. A different default would change digests."""
 
 ANALYSES = {
     "networks": "chimera_hpc.reduction.analyses.ring:networks",
@@ -69,7 +69,7 @@ ANALYSES = {
     "synthetic": "chimera_hpc.reduction.analyses.method:synthetic",
     "spectrum": "chimera_hpc.reduction.analyses.method:spectrum",
 }
-"""Functions of an `reduction.analyses.AnalysisInput` that return a dict for results.json."""
+"""Functions of a `reduction.analyses.AnalysisInput` that return a dict for results.json."""
 
 FIGURES = {
     "space_time": "chimera_hpc.plot.spacetime:space_time_figure",
@@ -89,8 +89,8 @@ FIGURES = {
     "synthetic_signal": "chimera_hpc.plot.synthetic:signal_figure",
     "spectrum": "chimera_hpc.plot.spectrum:spectrum_figure",
 }
-"""Functions of a `plot.figure_input.FigureInput` that return a matplotlib Figure, or None where
-the sweep has nothing for it to show."""
+"""Functions of a `plot.figure_input.FigureInput` that return a matplotlib Figure, or None if the
+sweep has no data for the figure."""
 
 CUT_FIGURES = {
     "dendrogram": "chimera_hpc.plot.dendrogram:dendrogram_figure",
@@ -98,8 +98,8 @@ CUT_FIGURES = {
     "modal_classes": "chimera_hpc.plot.modes:modal_classes_figure",
     "classification": "chimera_hpc.plot.classification:classification_figure",
 }
-"""The same with the number of clusters as second argument; it may follow the name, as in
-dendrogram_3."""
+"""Figures whose function has the number of clusters as its second argument. The number may follow
+the name, as in dendrogram_3."""
 
 
 @cache

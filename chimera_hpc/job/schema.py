@@ -1,7 +1,8 @@
-"""The JSON Schema of a job file, from the same tables that check one: for editors and other tools.
+"""The JSON Schema of a job file, for editors and other tools.
 
-It knows what a key is, not what holds between keys (2 P below n_nodes, a range that is not empty):
-a file that it passes may still be refused, and `plan` then says why.
+It is made from the tables that check a job. It covers single keys, not conditions between keys
+(2 P below n_nodes, a range that is not empty). A file that is valid by the schema may still be
+refused; `plan` then gives the reason.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from chimera_hpc.job.tables import TABLES, Reduction
 from chimera_hpc.models.parameters import ModelParameters
 
 FILE_NAME = "job.schema.json"
-"""Name of the schema beside the job files that come with the package."""
+"""File name of the schema, in the folder of the job files that come with the package."""
 
 _USER_MODEL = {"type": "string", "pattern": ":", "description": "package.module:object"}
 _AT_LEAST_ONE = {  # keys of which a list may be written as one value
@@ -28,8 +29,8 @@ _AT_LEAST_ONE = {  # keys of which a list may be written as one value
 def job_schema() -> dict[str, Any]:
     """Return the schema as plain data (JSON Schema, draft 2020-12).
 
-    A model's own parameters are the only ones allowed in [grid] and [fixed]; for a user's model,
-    whose parameters are not known here, any are.
+    Only the parameters of the model are allowed in [grid] and [fixed]. For a user's model, whose
+    parameters are not known here, any are allowed.
     """
     schema: dict[str, Any] = Sweep.model_json_schema()
     properties = schema["properties"]
@@ -60,7 +61,7 @@ def schema_text() -> str:
 
 
 def _only_for(name: str, model: ModelParameters) -> dict[str, Any]:
-    """Return the rule that [grid] and [fixed] hold only what this model knows."""
+    """Return the rule that [grid] and [fixed] hold only parameters of this model."""
     parameters = [parameter.name for parameter in model.parameters]
     numbers = (model.n_nodes, *model.parameters)
     defaults = {p.name: {"default": p.default} for p in numbers if p.default is not None}

@@ -1,4 +1,4 @@
-"""What a job may ask to be drawn: points by their values, figures by their names."""
+"""Selections in a job: points by their values; figures, analyses and measures by their names."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def parse_selection(
 ) -> dict[str, int | float]:
     """Return the values by name of a text such as ``P=9 Q=9 seed=0``.
 
-    `key` begins the message of the BadInput for anything else: words that are not NAME=NUMBER, a
-    name twice, and where it is said what is `known`, other names and values.
+    Raises BadInput for words that are not NAME=NUMBER, a repeated name and, if `known` is given,
+    unknown names and values. The message begins with `key`.
     """
     where = f"{key}: {short(text)}"
     values: dict[str, int | float] = {}
@@ -50,7 +50,7 @@ def parse_selection(
 def check_names(key: str, texts: Sequence[str], model: ModelParameters | None) -> None:
     """Raise BadInput for a selection with a name or value that the model does not know.
 
-    Without a model: that none of the project's own models knows; a selection may speak of another
+    Without a model, all models of the registry are tried, because a selection may refer to another
     sweep.
     """
     models = built_in().values() if model is None else [model]
@@ -66,9 +66,9 @@ def split_figure_name(name: str) -> tuple[str, int | None]:
 
 
 def check_selections(key: str) -> Callable[[Any], Any]:
-    """Return what turns a list of selections into a tuple of texts, or raises BadInput.
+    """Return a validator that turns a list of selections into a tuple of texts.
 
-    Names are checked by `check_names`, which knows the model.
+    The validator raises BadInput. `check_names`, which knows the model, checks the names.
     """
 
     def check(value: Any) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ def check_selections(key: str) -> Callable[[Any], Any]:
 
 
 def check_figures(value: Any) -> Any:
-    """Pass "auto", or return a tuple of known names of figures; BadInput for others."""
+    """Return "auto", or a tuple of known names of figures. Raises BadInput for other names."""
     if value == "auto":
         return value
     names, known = _texts(value), [*FIGURES, *CUT_FIGURES]
@@ -97,7 +97,7 @@ def check_figures(value: Any) -> Any:
 
 
 def check_analyses(value: Any) -> tuple[str, ...]:
-    """Return a tuple of known names of analyses; BadInput for others."""
+    """Return a tuple of known names of analyses. Raises BadInput for other names."""
     names = _texts(value)
     if names is None:
         raise BadInput(f"reduction.analyses: {short(value)} is not a list of names")
@@ -107,7 +107,7 @@ def check_analyses(value: Any) -> tuple[str, ...]:
 
 
 def check_measures(value: Any) -> tuple[str, ...]:
-    """Return a tuple of different known names of measures; BadInput for others."""
+    """Return a tuple of different known names of measures. Raises BadInput for other names."""
     names = _texts(value)
     if names is None:
         raise BadInput(f"measures.panel: {short(value)} is not a list of names")
@@ -121,7 +121,7 @@ def check_measures(value: Any) -> tuple[str, ...]:
 
 
 def check_name(key: str, kind: str, name: str, known: Iterable[str]) -> None:
-    """Raise BadInput, with the nearest known name, unless the name is known."""
+    """Raise BadInput, with the nearest known name, if the name is not known."""
     if name not in known:
         raise BadInput(f"{key}: {short(name)} is not {kind}{nearest(name, list(known))}")
 

@@ -1,4 +1,4 @@
-"""The job files that come with the package: in a source tree beside it, in a wheel inside of it."""
+"""The job files that come with the package: next to it in a source tree, inside it in a wheel."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def jobs_folder() -> Path:
 def job_file(name: str) -> Path:
     """Return the job file that a user means by `name`.
 
-    That is the file of this path if there is one, else one that comes with the package:
-    ``quickstart``, ``jobs/quickstart.toml`` and ``paper/plane`` name those from any folder. Where
-    there is neither, the path as it stands, for the message about it.
+    It is the file at this path, if it exists, else one that comes with the package:
+    ``quickstart``, ``jobs/quickstart.toml`` and ``paper/plane`` name those from any folder. If
+    neither exists, the path is returned unchanged, for the error message.
     """
     path = Path(name)
     if path.is_file() or path.is_absolute() or ".." in path.parts:

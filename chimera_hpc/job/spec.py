@@ -1,4 +1,4 @@
-"""The sweep as a value: a job file, validated and frozen."""
+"""A sweep: a job file, validated and frozen."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ _DIGESTED = ("model", "grid", "fixed", "integrator", "features")
 
 
 class Sweep(Table):
-    """A sweep: which points, how each is integrated and measured, what is made of them.
+    """A sweep: its points, their integration and measures, and the reduction.
 
-    Make one with `load`, `from_toml_text` or `from_dict`: they raise BadInput with one line. `grid`
-    holds each axis in normal form (`normal_form` of `axes`; seeds last), `fixed` every other
-    parameter of the model, defaults filled in, so that equal sweeps are equal values however they
-    were written.
+    Make one with `load`, `from_toml_text` or `from_dict`, which raise BadInput with one line.
+    `grid` holds each axis in normal form (`normal_form` of `axes`; seeds last). `fixed` holds every
+    other parameter of the model, with defaults. Two job files that mean the same sweep therefore
+    give equal values.
     """
 
     name: Annotated[str, StringConstraints(pattern=_FOLDER_NAME, max_length=100)] = Field(
@@ -95,7 +95,7 @@ class Sweep(Table):
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Self:
         """Return the sweep of a job file, with KEY=VALUE overrides (`reading.apply_overrides`).
 
-        The module of a user's model may lie beside the job file.
+        The module of a user's model may be in the folder of the job file.
         """
         folder = Path(path).parent
         return cls.from_toml_text(read_text(path), overrides, where=str(path), folder=folder)
@@ -110,7 +110,7 @@ class Sweep(Table):
     ) -> Self:
         """Return the sweep that TOML text describes; `where` begins the messages of errors.
 
-        The module of a user's model is looked for in `folder` too.
+        The module of a user's model is also searched for in `folder`.
         """
         data = parse_toml(text, where)
         if folder is not None:
@@ -128,14 +128,14 @@ class Sweep(Table):
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "sweep") -> Self:
-        """Return the sweep of plain data, such as `to_dict` gives; raise BadInput with one line."""
+        """Return the sweep of plain data as `to_dict` gives. Raises BadInput with one line."""
         try:
             return cls.model_validate(_with_new_names(data))
         except ValidationError as error:
             raise bad(where, one_line(error, list(cls.model_fields))) from None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON, defaults filled in; `from_dict` makes it a sweep again."""
+        """Return plain data for JSON, with defaults. `from_dict` is the inverse."""
         return self.model_dump(mode="json", exclude_none=True)
 
     @property
@@ -172,7 +172,7 @@ class Sweep(Table):
         return spec_digest(self.to_dict())
 
     def explain_difference(self, other: Sweep) -> list[str]:
-        """Return a line for each digested key that `other`, the one in the store, has otherwise."""
+        """Return one line per digested key with a different value in `other`, the stored sweep."""
         specs = (self.to_dict(), other.to_dict())
         here, there = (_flat({**_digested(spec), "measures": spec["measures"]}) for spec in specs)
         return [
@@ -182,7 +182,7 @@ class Sweep(Table):
         ]
 
     def points(self) -> Points:
-        """Return all points: axes in order of declaration, first slowest, seed fastest."""
+        """Return all points. Axes are in order of declaration; the first varies slowest."""
         axes = self.axes
         columns = expand(axes)
         n_points = len(columns["seed"])
@@ -234,8 +234,8 @@ class Sweep(Table):
 def spec_digest(spec: Mapping[str, Any]) -> str:
     """Return the digest of a sweep as `Sweep.to_dict` gave it.
 
-    Of one that an earlier version of the package stored, too: keys that came since do not enter,
-    and settings that were renamed enter under their old names.
+    The sweep may be from an earlier version of the package: newer keys do not enter the digest, and
+    renamed settings enter it under their old names.
     """
     data = _digested(spec)
     data["features"] = {_OLD_NAMES.get(key, key): v for key, v in data["features"].items()}
@@ -248,7 +248,7 @@ def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
     if "delta" in spec["grid"]:
         integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
         data["integrator"] = integrator
-    # Digests made before there was this table stay as they are.
+    # Digests from before this table existed must not change.
     default = Measures().model_dump(mode="json")
     if spec.get("measures", default) != default:
         data["measures"] = spec["measures"]
@@ -256,7 +256,7 @@ def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_new_names(data: Any, where: str = "") -> Any:
-    """Return a job with settings under their new names; with `where`, warn of each old one."""
+    """Return a job with settings under their new names. With `where`, warn of each old name."""
     features = data.get("features") if isinstance(data, dict) else None
     if not isinstance(features, dict):
         return data
@@ -277,7 +277,7 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _shown(value: Any) -> str:
-    """Return a value as a person would write it, a long list by its ends."""
+    """Return a value as text. A long list is shortened to its ends."""
     if value is None:
         return "nothing"
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""Tables of a job beside [grid] and [fixed]: every key with its default, bounds and meaning."""
+"""Tables of a job other than [grid] and [fixed]: each key with default, bounds and meaning."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from chimera_hpc.job.selection import (
 
 
 def _as_tuple(value: Any) -> Any:
-    """Take a list (TOML, JSON) for a tuple: a frozen value holds no list."""
+    """Convert a list (from TOML or JSON) to a tuple, because a frozen value holds no list."""
     return tuple(value) if isinstance(value, list) else value
 
 
 def _as_words(value: Any) -> Any:
-    """Take one name for a tuple of it."""
+    """Convert one name to a tuple of one name."""
     return (value,) if isinstance(value, str) else _as_tuple(value)
 
 
 def _names(value: Any) -> Any:
-    """Pass the naming rule or a tuple of different names."""
+    """Return the naming rule or a tuple of different names."""
     names = _as_tuple(value)
     if names == "triplet":
         return names
@@ -117,7 +117,7 @@ class Integrator(Table):
 
 
 class Features(Table):
-    """How a series becomes features."""
+    """How features are computed from a series."""
 
     start: float = Field(
         950.0, ge=0, description="Start of the analysis; it ends at integrator.t_end."
@@ -164,7 +164,7 @@ class Features(Table):
 
 
 class Measures(Table):
-    """Which numbers each run is measured by."""
+    """The measures of each run."""
 
     panel: Annotated[tuple[str, ...], BeforeValidator(check_measures)] = Field(
         DEFAULT_PANEL,
@@ -174,7 +174,7 @@ class Measures(Table):
 
 
 class Reduction(Table):
-    """How the points become classes; not part of the digest."""
+    """How the points are classified; not part of the digest."""
 
     linkage: Literal["ward", "average", "complete"] = Field(
         "ward", description="Distance between clusters."
@@ -230,7 +230,7 @@ class Reduction(Table):
 
 
 class Keep(Table):
-    """What of the time series stays in the store; not part of the digest."""
+    """Which time series the store keeps; not part of the digest."""
 
     series: Literal["all", "first-seed", "none"] = Field(
         "all", description="Points whose u is kept."
@@ -292,9 +292,9 @@ TABLES: dict[str, type[Table]] = {
 
 
 def unknown_key(table: str, key: str, known: list[str]) -> str:
-    """Return the message for a key that `table` (empty: the top of the file) does not have.
+    """Return the message for a key that `table` (empty for the top level) does not have.
 
-    It names the table that has such a key, else the nearest known key.
+    It names the table that has this key, else the nearest known key.
     """
     homes = {field: name for name, other in TABLES.items() for field in other.model_fields}
     home = {**homes, "seeds": "grid"}.get(key)

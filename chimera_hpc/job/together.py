@@ -1,4 +1,4 @@
-"""The points of several sweeps in one list, as a store that was extended holds them."""
+"""The points of several sweeps in one list, as in a store that was extended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all observables ask of a recording."""
+"""Input checks that all measures share."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Array = NDArray[np.float64]
 
 
 def floats(name: str, values: ArrayLike) -> Array:
-    """The values as float64, whatever their shape.
+    """Return values of any shape as float64.
 
     Raises
     ------
     BadInput
-        They are not real numbers (complex, dates, words), some are masked, or their rows differ in
-        length.
+        The values are not real numbers (complex, dates, words), some are masked, or the rows differ
+        in length.
     """
     if np.ma.is_masked(values):
         raise BadInput(f"{name} holds masked values: interpolate them or leave them out")
@@ -33,15 +33,15 @@ def floats(name: str, values: ArrayLike) -> Array:
 
 
 def node_rows(name: str, values: ArrayLike) -> Array:
-    """A recording (T, N) as contiguous rows (N, T), one a node.
+    """Return a recording (T, N) as contiguous rows (N, T), one per node.
 
-    An array whose transpose is contiguous is not copied, unless it is read-only: kernels would be
-    compiled once more for read-only arrays.
+    An array whose transpose is contiguous is not copied, unless it is read-only. Kernels would be
+    compiled again for read-only arrays.
 
     Raises
     ------
     BadInput
-        The shape is not (T, N) with T, N >= 1, or as `floats`.
+        The shape is not (T, N) with T, N >= 1; or as `floats`.
     """
     array = floats(name, values)
     if array.ndim != 2 or array.size == 0:
@@ -51,12 +51,12 @@ def node_rows(name: str, values: ArrayLike) -> Array:
 
 
 def integer(name: str, value: int) -> int:
-    """The value as int.
+    """Return the value as int.
 
     Raises
     ------
     BadInput
-        It is not a whole number.
+        The value is not a whole number.
     """
     try:
         return operator.index(value)

@@ -1,15 +1,14 @@
 """Amplitude, frequency, phase and baseline of oscillations, window by window (the Fourier method).
 
-In a window w a signal is described by its dominant line (paper, sections ssec:Fourier and
-sec:Fourier),
+In a window, a signal is described by its dominant line (paper, ssec:Fourier and sec:Fourier),
 
-    y(t) ~ a0 + a cos(2 pi Omega (t - t_ref) + theta) ,
+    y(t) ~ a0 + a cos(2 pi Omega (t - t_ref) + theta) .
 
-found in three steps: the largest line of the amplitude spectrum 2 |X_k| / n of y - <y> (no
-padding, no taper, never bin 0); the vertex of the parabola through that line and its neighbours,
-which is Omega; the least squares of p1 cos(2 pi Omega t + p2) + p3 with Omega fixed, which is
-linear in (p1 cos p2, p1 sin p2, p3) and so needs no iteration. Mean and standard deviation over
-the windows are the features (eq:averages, eq:stds).
+It is found in three steps. (1) Find the largest line of the amplitude spectrum 2 |X_k| / n of
+y - <y>, without padding, taper or bin 0. (2) Omega is the vertex of the parabola through this line
+and its neighbours. (3) Fit p1 cos(2 pi Omega t + p2) + p3 by least squares with Omega fixed, a
+problem that is linear in (p1 cos p2, p1 sin p2, p3). The features are mean and standard deviation
+over the windows (eq:averages, eq:stds).
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ FEATURES = (*QUANTITIES, *(f"{name}_std" for name in QUANTITIES))
 
 _PHASE = QUANTITIES.index("phase")
 _FREQUENCY = QUANTITIES.index("frequency")
-# Largest departure of a time from its place on the uniform grid, in steps.
+# Largest distance of a time from the uniform grid, in steps.
 _UNIFORM = 1e-2
 
 
@@ -47,8 +46,8 @@ _UNIFORM = 1e-2
 class FourierFeatures:
     """Means and standard deviations over windows of the lines of N signals.
 
-    All arrays have shape (N,) and are NaN unless `status` is DONE; the deviations are NaN for a
-    single window. The field names are those of `FEATURES`, in order.
+    All arrays have shape (N,) and are NaN unless `status` is DONE. The standard deviations are NaN
+    for a single window. The first fields are those of `FEATURES`, in order.
     """
 
     amplitude: Array
@@ -59,7 +58,7 @@ class FourierFeatures:
     frequency_std: Array
     phase_std: Array  # rad
     baseline_std: Array
-    n_windows: int  # of each signal; with window_reference "own", the least over the signals
+    n_windows: int  # of each signal; with window_reference "own", the minimum over the signals
     deviation: float  # mean over the signals of the standard deviation in time
     status: Status  # DONE, STEADY or NO_WINDOW
 
@@ -70,12 +69,12 @@ class FourierFeatures:
 
 @dataclass(frozen=True, eq=False)
 class WindowLines:
-    """The lines of N signals in each of up to q windows, before any average.
+    """The lines of N signals in each of up to q windows, before averaging.
 
-    `amplitude`, `frequency`, `phase` and `baseline` have shape (N, q); `first` and `last` (samples,
+    `amplitude`, `frequency`, `phase` and `baseline` have shape (N, q). `first` and `last` (samples,
     both inside the window) and `counts` have one row per reference signal: 1 for window_reference
-    "ring", N for "own". Beyond a row's count, values are NaN and samples 0. All but `deviation` are
-    empty unless `status` is DONE.
+    "ring", N for "own". After a row's count, values are NaN and samples 0. All fields except
+    `deviation` are empty unless `status` is DONE.
     """
 
     amplitude: Array
@@ -112,10 +111,10 @@ def fourier_features(
     time_origin: TimeOrigin = "window",
     steady_threshold: float = 1e-2,
 ) -> FourierFeatures:
-    r"""Mean amplitude, frequency, phase and baseline of each signal, and how much they vary.
+    r"""Mean and standard deviation of amplitude, frequency, phase and baseline of each signal.
 
     A window runs from a maximum of the reference signal to its (n_peaks - 1)-th next maximum, both
-    samples included; consecutive windows share n_overlap maxima. With q windows and Z^(w) the value
+    samples included. Consecutive windows share n_overlap maxima. For q windows and the value Z^(w)
     of a quantity in window w (eq:averages, eq:stds),
 
         <Z> = sum_w Z^(w) / q ,        sigma_Z^2 = sum_w (Z^(w) - <Z>)^2 / (q - 1) .
@@ -123,43 +122,42 @@ def fourier_features(
     Parameters
     ----------
     t : array_like, shape (T,)
-        Times, uniform.
+        Uniform times.
     u : array_like, shape (T, N)
         Signals of any model or experiment. An array whose transpose is contiguous is not copied.
     n_peaks, n_overlap : int
-        Maxima in a window (at least 3), and maxima shared by consecutive windows
-        (0 <= n_overlap < n_peaks).
+        Maxima per window (>= 3), and maxima that consecutive windows share (0 <= n_overlap <
+        n_peaks).
     window_reference : {"ring", "own"}
-        The signal whose maxima place the windows: that of `reference_node` for all signals
-        ("ring"), or each signal itself ("own").
+        Signal whose maxima define the windows: that of `reference_node` for all signals ("ring"),
+        or each signal itself ("own").
     reference_node : int
-        Column of u (0-based) of the reference signal; without effect on "own".
+        Column of u (0-based) of the reference signal; ignored for "own".
     phase_mean : {"circular", "arithmetic"}
-        Circular: <theta> = arg sum_w exp(i theta^(w)), and the deviations from it are taken
-        around the circle, in [-pi, pi), before they are squared. Arithmetic: the two formulas
-        as they stand, on phases in [-pi, pi).
+        Circular: <theta> = arg sum_w exp(i theta^(w)); deviations are wrapped into [-pi, pi) before
+        they are squared. Arithmetic: the formulas above, for phases in [-pi, pi).
     refine : {"parabola", "sine-fit"}
-        Three steps as in the module's text; or a least squares over frequency, amplitude, phase
-        and baseline together (four-parameter sine fit, IEEE Std 1057-2017), by Gauss-Newton steps
-        from the result of the three.
+        The three steps above (module), or a least-squares fit of frequency, amplitude, phase and
+        baseline together (four-parameter sine fit, IEEE Std 1057-2017). The fit makes Gauss-Newton
+        steps from the result of the three steps.
     time_origin : {"window", "absolute"}
-        Phase at the window's first sample, or at t = 0 (for the start of the recording pass
-        t - t[0]). An absolute phase carries the error of the frequency times 2 pi t: only the
-        sine fit makes it useful far from t = 0.
+        Phase at the window's first sample, or at t = 0 (pass t - t[0] for the first time). An
+        absolute phase has the error of the frequency times 2 pi t, so use the sine fit far from
+        t = 0.
     steady_threshold : float
         Limit for the mean over signals of the standard deviation in time of u, in the unit of u.
 
     Returns
     -------
     FourierFeatures
-        Status STEADY if u varies less than `steady_threshold`, else NO_WINDOW if the reference
-        signal has fewer than n_peaks maxima (with "own": if any signal has), else DONE. Constant
-        signals among oscillating ones have amplitude, frequency and phase 0.
+        Status STEADY if u varies less than `steady_threshold`; else NO_WINDOW if the reference
+        signal ("own": any signal) has fewer than n_peaks maxima; else DONE. Constant signals among
+        oscillating ones have amplitude, frequency and phase 0.
 
     Raises
     ------
     BadInput
-        A wrong shape or option, a time step that is not uniform, a value that is not finite.
+        A wrong shape or option, times that are not uniform, or a value that is not finite.
 
     Examples
     --------
@@ -211,7 +209,7 @@ def window_lines(
     time_origin: TimeOrigin = "window",
     steady_threshold: float = 1e-2,
 ) -> WindowLines:
-    """Lines of all signals in all windows; parameters and errors as for `fourier_features`."""
+    """Lines of all signals in all windows. Parameters and errors as in `fourier_features`."""
     recording = _recording(t, u)
     n_nodes = recording.x.shape[0]
     n_peaks, n_overlap = _check_windows(n_peaks, n_overlap)
@@ -245,7 +243,7 @@ def window_lines(
 
 
 def wrap(angle: Array) -> Array:
-    """Angle (rad) moved into [-pi, pi)."""
+    """Return an angle (rad) wrapped into [-pi, pi)."""
     inside = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
     return np.where(inside >= np.pi, -np.pi, np.maximum(inside, -np.pi))
 
@@ -260,7 +258,7 @@ def _no_lines(n_nodes: int, deviation: float, status: Status) -> WindowLines:
 def _place_windows(
     references: Array, n_peaks: int, n_overlap: int
 ) -> tuple[windows.Samples, windows.Samples, windows.Samples]:
-    """First and last samples (C, q) of the windows of C signals (C, T), and their counts (C,)."""
+    """Return first and last samples (C, q) and counts (C,) of the windows of C signals (C, T)."""
     placed = [windows.windows(windows.maxima(x), n_peaks, n_overlap) for x in references]
     counts = np.array([last.size for _, last in placed])
     first = np.zeros((len(placed), counts.max()), dtype=np.int64)
@@ -271,12 +269,9 @@ def _place_windows(
     return first, last, counts
 
 
-# --- kernels -------------------------------------------------------------------------------------
-
-
 @jit()
 def _deviations(x: Any, work: Any, out: Any) -> None:
-    """Standard deviation (ddof 0) in time of each row of x (N, T) into out (N,)."""
+    """Write the standard deviation (ddof 0) in time of each row of x (N, T) into out (N,)."""
     for j in range(x.shape[0]):
         _, energy, _ = lines.centre(x[j], 0, x.shape[1], work.z, work.sums)
         out[j] = math.sqrt(energy / x.shape[1])
@@ -286,12 +281,12 @@ def _deviations(x: Any, work: Any, out: Any) -> None:
 def _fill_lines(
     x: Any, first: Any, last: Any, counts: Any, bins: Any, refine: bool, work: Any, values: Any
 ) -> None:
-    """Lines of each row of x (N, T) in its windows into values (N, q, 4).
+    """Write the lines of each row of x (N, T) in its windows into values (N, q, 4).
 
-    Frequencies are angles a sample; phases belong to the first sample and are not wrapped. bins
-    (N,) holds a guess at the dominant bin of each row, and in the end its bin in the last window.
+    Frequencies are angles per sample. Phases are at the first sample, not wrapped. bins (N,) holds
+    a guess for the dominant bin of each row and is updated to its bin in the last window.
     """
-    # Window by window: signals with one clock have windows of one length, whose rotations are kept.
+    # The outer loop is over windows: signals that share a window also share cached rotations.
     for m in range(first.shape[1]):
         for j in range(x.shape[0]):
             c = j % counts.size
@@ -304,7 +299,7 @@ def _fill_lines(
 
 @jit()
 def _average(values: Any, counts: Any, circular: bool, out: Any) -> None:
-    """Means and deviations over windows of values (4, N, q) into out (8, N)."""
+    """Write means and standard deviations over windows of values (4, N, q) into out (8, N)."""
     for j in range(values.shape[1]):
         q = counts[j % counts.size]
         for row in range(4):
@@ -323,7 +318,7 @@ def _average(values: Any, counts: Any, circular: bool, out: Any) -> None:
 
 @jit()
 def _mean(x: Any) -> float:
-    """Mean of x, exact where all values are equal."""
+    """Return the mean of x, which is exact if all values are equal."""
     origin = x[0]
     total = 0.0
     for m in range(x.size):
@@ -334,16 +329,13 @@ def _mean(x: Any) -> float:
 
 @jit()
 def _circular_mean(x: Any) -> float:
-    """Direction of the mean of exp(i x), in [-pi, pi); 0 where that mean is exactly zero."""
+    """Return the argument of the mean of exp(i x), in [-pi, pi); 0 if that mean is zero."""
     along, across = 0.0, 0.0
     for m in range(x.size):
         along += math.cos(x[m])
         across += math.sin(x[m])
     mean = math.atan2(across, along)
     return mean if mean < math.pi else -math.pi
-
-
-# --- checks --------------------------------------------------------------------------------------
 
 
 def _recording(t: ArrayLike, u: ArrayLike) -> _Recording:
@@ -365,7 +357,7 @@ def _recording(t: ArrayLike, u: ArrayLike) -> _Recording:
 
 
 def _mean_deviation(x: Array) -> float:
-    """Mean over signals of the standard deviation in time; BadInput where u isn't finite."""
+    """Return the mean over signals of the standard deviation in time; BadInput if not finite."""
     deviations = np.empty(x.shape[0])
     _deviations(x, lines.work_arrays(x.shape[1]), deviations)
     if not np.isfinite(deviations).all():

@@ -9,16 +9,16 @@ of N nodes and <z> the mean of z over all nodes,
     SI       = 1 - sum_m s_m / M ,          s_m = Theta(delta - sigma(m)) ,
     eta      = sum_m |s_m - s_{m+1}| / 2 ,  group M + 1 being the first.
 
-Conventions where the sources leave room:
+Conventions that the sources leave open:
 
-- z_N = x_N - x_1, so <z> = 0 at every time and drops out;
+- z_N = x_N - x_1, so <z> = 0 at every time;
 - N nodes fall into M groups as `numpy.array_split` does it: the first N mod M groups have one
   node more than the others (50 nodes in 6 groups: 9, 9, 8, 8, 8, 8);
-- Theta(0) = 1: a group whose deviation equals delta counts as coherent;
-- delta is in the units of x here; a fraction of `range_of(x)` is the reading under which the
-  paper's figures come out.
+- Theta(0) = 1: a group whose deviation equals delta is coherent;
+- delta is in the units of x. A delta given as a fraction of `range_of(x)` reproduces the paper's
+  figures.
 
-Test vector, by hand: two times and four nodes,
+Test vector, computed by hand, for two times and four nodes:
 
     x = (0, 1, 0, 0), (2, 2, 5, 1):   z = (-1, 1, 0, 0), (0, -3, 4, -1)
     sigma    = (sqrt(2/4) + sqrt(26/4)) / 2                          = 1.628308
@@ -45,7 +45,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures.checks import Array, integer, node_rows
 
-# Times handled together, so that their sums stay in the first-level cache.
+# Times per chunk, so that their sums stay in the first-level cache.
 _CHUNK = 1024
 
 
@@ -55,7 +55,7 @@ def range_of(x: ArrayLike) -> float:
     Raises
     ------
     BadInput
-        x is not of shape (times, nodes), or holds a value that is not finite.
+        x does not have shape (times, nodes), or holds a value that is not finite.
     """
     rows = node_rows("x", x)
     return float(_finite(rows.max() - rows.min(), "x"))
@@ -68,7 +68,7 @@ def differences(x: ArrayLike) -> Array:
 
 
 def sigma(x: ArrayLike) -> float:
-    """Time mean of the standard deviation over all nodes of the differences of neighbours.
+    """Time mean of the standard deviation over all nodes of the differences between neighbours.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def sigma(x: ArrayLike) -> float:
 
 
 def local_sigma(x: ArrayLike, groups: int) -> Array:
-    """The same within each of a number of groups of neighbouring nodes, shape (groups,).
+    """Return sigma(m) of each group of neighbouring nodes, shape (groups,).
 
     Raises
     ------
@@ -114,15 +114,15 @@ def strength_of_incoherence(local: ArrayLike, delta: Array) -> Array: ...
 def strength_of_incoherence(local: ArrayLike, delta: float | Array) -> float | Array:
     """SI = 1 - sum_m Theta(delta - sigma(m)) / M with Theta(0) = 1.
 
-    0 for a coherent state, 1 for an incoherent one, between them for a chimera.
+    SI is 0 for a coherent state, 1 for an incoherent state, and between 0 and 1 for a chimera.
 
     Parameters
     ----------
     local : array_like, shape (M,) or (..., M)
         `local_sigma` of one run, or of many.
     delta : float or array
-        Threshold, >= 0, in the units of `local`; an array goes with the axes of `local` but the
-        last, by NumPy's broadcasting.
+        Threshold, >= 0, in the units of `local`. An array is broadcast against all axes of `local`
+        except the last.
 
     Returns
     -------
@@ -144,10 +144,10 @@ def discontinuity_measure(local: ArrayLike, delta: Array) -> Array: ...
 
 
 def discontinuity_measure(local: ArrayLike, delta: float | Array) -> float | Array:
-    """Number of incoherent stretches: ``eta = sum_m |s_m - s_{m+1}| / 2`` around the ring.
+    """Number of incoherent regions: ``eta = sum_m |s_m - s_{m+1}| / 2`` around the ring.
 
-    1 for a chimera, 2 and more for a multi-chimera, 0 for a coherent and for an incoherent state
-    (all s_m equal). Parameters, result and errors as `strength_of_incoherence`.
+    eta is 1 for a chimera, 2 or more for a multi-chimera, and 0 for a coherent or an incoherent
+    state (all s_m equal). Parameters, result and errors as in `strength_of_incoherence`.
     """
     s = _coherent(local, delta)
     return _plain(0.5 * np.abs(s - np.roll(s, -1, axis=-1)).sum(axis=-1))
@@ -159,8 +159,8 @@ def order_parameter(u: ArrayLike, w: ArrayLike) -> float:
         R = < | sum_j exp(i phi_j) / N | >_t ,
         phi_j(t) = atan2(w_j(t) - <w_j>_t, u_j(t) - <u_j>_t) ,
 
-    the geometric phase about each node's mean point (Kuramoto's order parameter). A node at its
-    mean point has phase 0.
+    where phi_j is the geometric phase about each node's mean point (Kuramoto's order parameter). A
+    node at its mean point has phase 0.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def order_parameter(u: ArrayLike, w: ArrayLike) -> float:
 
 @jit()
 def _local_sigma(x: Any, bounds: Any, square: Any, out: Any) -> None:
-    """sigma(m) of x (N, T) into out (M,); group m is nodes bounds[m] .. bounds[m+1] - 1."""
+    """Write sigma(m) of x (N, T) into out (M,). Group m is nodes bounds[m] .. bounds[m+1] - 1."""
     n_nodes, n_times = x.shape
     for m in range(out.size):
         out[m] = 0.0
@@ -205,7 +205,7 @@ def _local_sigma(x: Any, bounds: Any, square: Any, out: Any) -> None:
 
 @jit()
 def _order_parameter(x: Any, y: Any, x_mean: Any, y_mean: Any, vector: Any) -> Any:
-    """Order parameter of x, y (N, T); vector (2, chunk) is work."""
+    """Return the order parameter of x, y (N, T); vector (2, chunk) is a work array."""
     n_nodes, n_times = x.shape
     along, across = vector[0], vector[1]
     total = 0.0
@@ -229,14 +229,14 @@ def _order_parameter(x: Any, y: Any, x_mean: Any, y_mean: Any, vector: Any) -> A
 
 
 def _finite(result: Any, what: str) -> Any:
-    """The result; any value of the signals that is not finite has made it so too."""
+    """Return the result. It is not finite if any value of the signals is not finite."""
     if not np.isfinite(result).all():
         raise BadInput(f"{what} must be finite")
     return result
 
 
 def _coherent(local: ArrayLike, delta: float | Array) -> Array:
-    """s_m as 0.0 or 1.0, NaN all over a run with a NaN deviation."""
+    """Return s_m as 0.0 or 1.0. All s_m of a run with a NaN deviation are NaN."""
     deviations = np.asarray(local, dtype=np.float64)
     threshold = np.asarray(delta, dtype=np.float64)[..., None]
     if deviations.ndim == 0 or deviations.shape[-1] == 0:

@@ -1,18 +1,19 @@
 """Kernels for the dominant spectral line of one window: the three steps of the Fourier method.
 
-Every number comes from one operation, the sums C = sum z_i cos(w i) and S = sum z_i sin(w i) of
-the centred samples z at one angular frequency w a sample, at a bin of the discrete Fourier
-transform or between bins. A window over n_peaks maxima has its dominant line near bin
-n_peaks - 1, so a few bins are enough: by Parseval's theorem,
+All steps use the sums C = sum z_i cos(w i) and S = sum z_i sin(w i) of the centred samples z at an
+angular frequency w per sample, at a bin of the discrete Fourier transform or between bins. A window
+over n_peaks maxima has its dominant line near bin n_peaks - 1, so few bins are needed. By
+Parseval's theorem,
 
     sum over k = 1 .. n-1 of |X_k|^2 = n sum z_i^2 ,
 
-what the bins seen so far leave of the energy bounds every bin not yet seen, and the search ends
-when that is less than the largest line. The bin found is the one of the full transform, without
-its cost at window lengths with large prime factors. (Where broadband noise holds more energy than
-the line, the search goes through all bins: the same answer at 10 to 20 times the cost.)
+the energy that remains after the bins computed so far is a bound for every other bin. The search
+ends when this bound is less than the largest line. The result is that of the full transform, which
+is slow at window lengths with large prime factors. (If broadband noise has more energy than the
+line, the search computes all bins, at 10 to 20 times the cost.)
 
-Sums run as SUMS independent partial sums, in one fixed order: the same bits everywhere.
+Each sum is made of SUMS independent partial sums in a fixed order, so the bits are the same on all
+machines.
 """
 
 from __future__ import annotations
@@ -26,18 +27,18 @@ from numpy.typing import NDArray
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.simd import LANES, broadcast, fold, load_at, store_at
 
-# Partial sums that run side by side, in two vectors.
+# Number of partial sums, in two vectors.
 SUMS = 2 * LANES
 ROWS = 4
 BLOCK = SUMS * ROWS
-# Bins whose rotations are kept at hand: the signals of a ring share their windows.
+# Number of bins whose rotations are cached: the signals of a ring share their windows.
 SLOTS = 8
 
-# Largest relative rounding error that the energy balance of a window is trusted to have.
+# Bound for the relative rounding error of a window's energy balance.
 _BALANCE = 1e-12
 _MAX_STEPS = 50
 _MAX_HALVINGS = 10
-# Angle at the window's ends (rad) below which a Gauss-Newton step changes nothing any more.
+# Gauss-Newton steps end when a step changes the angle at the window's ends by less (rad).
 _SMALL_ANGLE = 1e-12
 
 
@@ -185,7 +186,7 @@ def _begin_turning(w, turn):
 @jit()
 def _bin_power(z, n, k, turn):
     """|X_k|^2 of the discrete Fourier transform of z."""
-    # Beside the rotations stands which length and bin they belong to.
+    # The length and bin of cached rotations are stored with them.
     mine = turn[k % SLOTS]
     if mine[2, 2] != n or mine[2, 3] != k:
         _begin_turning(2.0 * math.pi * k / n, mine)
@@ -205,10 +206,10 @@ def dominant_bin(
     power,
     turn,
 ):
-    """Bin k >= 1 with the largest |X_k|, the lowest of equal ones; fills power[k-1 : k+2].
+    """Return the lowest bin k >= 1 with the largest |X_k|. Fills power[k-1 : k+2].
 
-    The bins are searched outwards from `guess` until the energy left can't hold a larger line
-    (see the module's text); the guess changes the cost and not the result.
+    The bins are searched outwards from `guess` until the remaining energy is too small for a larger
+    line (see the module's docstring). The guess affects the cost, not the result.
     """
     top = (n - 1) // 2  # highest bin below the Nyquist frequency
     left = 0.5 * n * energy
@@ -245,8 +246,8 @@ def dominant_bin(
 def parabola_shift(power, k, n):
     """Distance, in bins, from bin k to the vertex of the parabola through bins k-1, k, k+1.
 
-    The parabola goes through the amplitudes |X|. At the edges of the spectrum (bin 1, whose lower
-    neighbour is the mean that was taken away, and the last bin) there is none, and the shift is 0.
+    The parabola goes through the amplitudes |X|. The shift is 0 at the edges of the spectrum: at
+    the last bin, and at bin 1, whose lower neighbour is the subtracted mean.
     """
     if k <= 1 or k >= n // 2:
         return 0.0
@@ -267,10 +268,10 @@ def _kernel_sum(n, w):
 def fit_at(z, n, w, turn):
     """Least squares of A cos(w s) + B sin(w s) + K to the centred samples, 0 < w < pi.
 
-    s = i - (n-1)/2 counts from the middle of the window: there the sine decouples from the other
-    two, and the sums of the normal equations are Dirichlet kernels.
+    s = i - (n-1)/2 is measured from the middle of the window. This decouples the sine from the
+    other two terms, and the sums of the normal equations are Dirichlet kernels.
 
-    Returns A, B, K, the energy the fit explains, and the angle w (n-1)/2 from start to middle.
+    Returns A, B, K, the energy that the fit explains, and the angle w (n-1)/2 from start to middle.
     """
     c, s = line_sums(z, n, w, turn)
     angle = 0.5 * (n - 1) * w
@@ -287,8 +288,8 @@ def fit_at(z, n, w, turn):
 def _newton_step(z_s, n, w, a, b, k, turn):
     """Gauss-Newton step in w of the four-parameter sine fit; z_s holds s z.
 
-    It is the coefficient of the model's derivative d = s (B cos(w s) - A sin(w s)) in the least
-    squares of the residual over cos, sin, 1 and d.
+    The residual is fitted by cos, sin, 1 and the model's derivative d = s (B cos(w s) -
+    A sin(w s)). The step is the coefficient of d.
     """
     c, s = line_sums(z_s, n, w, turn)
     angle = 0.5 * (n - 1) * w
@@ -329,8 +330,8 @@ def _kernel_derivatives(n, w):
 def sine_fit(z, z_s, n, energy, w, turn):
     """Angular frequency of the four-parameter sine fit (IEEE Std 1057), started at w.
 
-    Gauss-Newton steps, halved as long as they explain less of the energy; they stay within one
-    bin of the start and half a bin away from zero and from the Nyquist frequency.
+    A Gauss-Newton step is halved while it explains less of the energy. The frequency stays within
+    one bin of the start, and half a bin away from zero and the Nyquist frequency.
     """
     one_bin = 2.0 * math.pi / n
     lowest = max(w - one_bin, 0.5 * one_bin)
@@ -342,7 +343,7 @@ def sine_fit(z, z_s, n, energy, w, turn):
         for _ in range(_MAX_HALVINGS):
             trial = min(max(w + step, lowest), highest)
             a, b, k, new_gain, _ = fit_at(z, n, trial, turn)
-            # the gain is flat at its maximum: near it, rounding must not refuse a good step
+            # The gain is flat at its maximum, so rounding must not reject a good step there.
             if new_gain >= gain - _BALANCE * energy:
                 accepted = True
                 break
@@ -358,10 +359,10 @@ def sine_fit(z, z_s, n, energy, w, turn):
 
 @jit()
 def window_line(x, first, n, guess, refine: bool, work, out):
-    """Amplitude, angular frequency a sample, phase at the first sample, baseline into out (4,).
+    """Write amplitude, angular frequency per sample, phase and baseline into out (4,).
 
-    Samples that are all equal have amplitude, frequency and phase 0. Returns the dominant bin,
-    a good guess for the next window.
+    The phase is at the first sample. If all samples are equal, amplitude, frequency and phase are
+    0. Returns the dominant bin, which is a good guess for the next window.
     """
     z, z_s, power, turn, sums = work
     mean, energy, alternating = centre(x, first, n, z, sums)
@@ -370,7 +371,7 @@ def window_line(x, first, n, guess, refine: bool, work, out):
         return guess
     at: int = dominant_bin(z, n, energy, alternating, guess, power, turn)
     if 2 * at == n:
-        # the sine vanishes at every sample: amplitude and sign of (-1)^i are all there is
+        # The sine is zero at every sample; only amplitude and sign of (-1)^i remain.
         out[0], out[1], out[3] = abs(alternating) / n, math.pi, mean
         out[2] = 0.0 if alternating >= 0.0 else -math.pi
         return at

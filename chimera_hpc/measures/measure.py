@@ -1,4 +1,4 @@
-"""What a measure is: from one measured run to numbers with labels."""
+"""The interface of a measure, which turns one run into labelled numbers."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ class MeasuredRun(NamedTuple):
     t: NDArray[np.float64]
     """(T,)"""
     u: NDArray[np.float64]
-    """(T, N), as it is stored"""
+    """(T, N), as stored"""
     w: NDArray[np.float64]
     """(T, N)"""
     features: FourierFeatures
     settings: Any
     """The job's table [features]: `job.tables.Features`."""
     distance: float
-    """Of the last state from the centre of the ball of initial states, in the ball's norm."""
+    """Distance of the last state from the centre of the ball of initial states, in its norm."""
 
 
 @dataclass(frozen=True)
 class Measure:
-    """Numbers of one run. Its module loads no kernels: labels are known without them."""
+    """Numbers of one run. The module of a measure loads no kernels, so labels are cheap to read."""
 
     labels: Callable[[Any], Sequence[str]]
-    """Names of the numbers, for a table [features] of a job."""
+    """Return the names of the numbers, for a table [features] of a job."""
     compute: Callable[[MeasuredRun], Sequence[float] | NDArray[np.float64]]
-    """The numbers, as many as labels; NaN where one is not defined."""
+    """Return one number per label; NaN where it is not defined."""

@@ -1,4 +1,4 @@
-"""Series: from the order in which they are sampled to that of the features, and to integers."""
+"""Time series: transposition to contiguous nodes, and rounding to integers."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from chimera_hpc.integrate.jit import jit
 
 Array = NDArray[np.float64]
 
-# Times turned together: one side of a transposition is always read or written across.
+# Times per block of a transposition, for which one side is not contiguous.
 _TILE = 64
 
 
 def quantise(
     rows: Array, scale: float, missing: int, stored: NDArray[np.int16], back: Array
 ) -> int:
-    """Write a series as integers, ``round(rows / scale)``, and what they give back.
+    """Write a series as integers, ``round(rows / scale)``, and the values that these represent.
 
     A value that is NaN or needs more than ``-missing - 1`` steps is stored as ``missing``.
 
     Parameters
     ----------
     rows : shape (N, T)
-        The series, node by node; in memory best time by time, as the integrator leaves it.
+        The series. Fastest if it is contiguous in the nodes, as the integrator writes it.
     stored : int16, shape (T, N)
     back : shape (N, T)
-        Gets ``stored * scale``.
+        Set to ``stored * scale``.
 
     Returns
     -------
     int
-        Number of values that are missing; their places in ``back`` mean nothing.
+        Number of missing values. Their entries in ``back`` are undefined.
     """
     number: int = _quantise(*_time_by_time(rows), scale, missing, stored, back)
     return number
@@ -49,7 +49,7 @@ def round_to(rows: Any, scale: float, out: Any) -> None:
 
 
 def by_node(rows: Array, out: Array) -> Array:
-    """Return `rows` (n, T) so that each row is contiguous: in `out`, unless they are already."""
+    """Return `rows` (n, T) with contiguous rows. They are copied to `out` if necessary."""
     if rows.flags.c_contiguous:
         return rows
     _turn(*_time_by_time(rows), out)
@@ -57,9 +57,9 @@ def by_node(rows: Array, out: Array) -> Array:
 
 
 def _time_by_time(rows: Array) -> tuple[Array, int]:
-    """Return rows (n, T) as one line of memory, and the step from one time in it to the next.
+    """Return rows (n, T) as a flat array, and its stride from one time to the next.
 
-    Kernels read rows of another array so without a copy, and see that neighbours are neighbours.
+    Kernels can then read rows of another array without a copy, with contiguous neighbours.
     """
     n, n_times = rows.shape
     size = rows.itemsize
@@ -80,7 +80,7 @@ def _quantise(line: Any, step: int, scale: float, missing: int, stored: Any, bac
         for t in range(first, last):
             here, out = line[t * step : t * step + n_nodes], stored[t]
             for i in range(n_nodes):
-                # Compared before it is an integer: the integer of a NaN is anything.
+                # Compared before the conversion, because the integer of a NaN is undefined.
                 steps = np.rint(here[i] / scale)
                 fits = abs(steps) <= limit
                 lost += 0 if fits else 1

@@ -27,7 +27,7 @@ def total_variations(features: HasProfiles) -> tuple[float, float, float]:
     """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, section ssec:TNVar).
 
     As `total_variation_arrays`, for an object with the attributes phase, amplitude and frequency.
-    NaN where the features are, which is where their status is not DONE.
+    The result is NaN if the features are NaN, i.e. if their status is not DONE.
     """
     return total_variation_arrays(features.phase, features.amplitude, features.frequency)
 
@@ -41,17 +41,17 @@ def total_variation_arrays(
         V_a     = sum_i |a_{i+1} - a_i| / N ,
         V_Omega = sum_i |Omega_{i+1} - Omega_i| / N ,
 
-    with node N+1 the first one (paper, section ssec:TNVar). V_theta takes v_i modulo 2 pi first,
-    so phases need not lie in one turn; it is in [0, 1]. V_a has the unit of the signal, V_Omega
-    that of the frequency.
+    where node N+1 is node 1 (paper, section ssec:TNVar). For V_theta, v_i is reduced modulo 2 pi,
+    so phases may be outside [0, 2 pi). V_theta is in [0, 1], V_a has the unit of the signal, and
+    V_Omega that of the frequency.
 
     Parameters
     ----------
     phase, amplitude, frequency : array_like, shape (N,)
         Phase in rad.
     ring : bool
-        Without it the nodes are a chain: node N has no next one, and the N - 1 differences are
-        divided by N - 1, so that V stays the mean over pairs of neighbours.
+        If False, the nodes form a chain. The sum of N - 1 differences is then divided by N - 1, so
+        V is still the mean over pairs of neighbours.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Time windows that follow the signal: they begin and end at its maxima.
+"""Time windows that begin and end at maxima of the signal.
 
-A window runs from a maximum to the (n_peaks - 1)-th maximum after it, both samples included, so
-it holds n_peaks maxima and n_peaks - 1 periods; consecutive windows share n_overlap maxima.
+A window runs from a maximum to the (n_peaks - 1)-th maximum after it, both samples included. It
+holds n_peaks maxima and n_peaks - 1 periods. Consecutive windows share n_overlap maxima.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Samples = NDArray[np.int64]
 
 @jit()
 def _find_maxima(x: Any, found: Any) -> int:
-    """Write the places of the maxima of x (T,) into found and return their number."""
+    """Write the indices of the maxima of x (T,) into found. Return their number."""
     count = 0
     i = 1
     while i < x.size - 1:
@@ -35,11 +35,11 @@ def _find_maxima(x: Any, found: Any) -> int:
 
 
 def maxima(x: NDArray[np.float64]) -> Samples:
-    """Places of the local maxima of a signal.
+    """Indices of the local maxima of a signal.
 
-    A maximum is a run of equal samples with a smaller one on either side; a run longer than one
-    sample (a plateau) counts once, at its middle, rounded down. The first and the last sample of
-    the signal are never maxima.
+    A maximum is a sample, or a run of equal samples, with a smaller sample on either side. A run (a
+    plateau) gives one index, that of its middle, rounded down. The first and the last sample of the
+    signal are never maxima.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def maxima(x: NDArray[np.float64]) -> Samples:
 
     Returns
     -------
-    ndarray of int64, rising
+    ndarray of int64, increasing
 
     Examples
     --------
@@ -65,9 +65,9 @@ def windows(peaks: Samples, n_peaks: int, n_overlap: int) -> tuple[Samples, Samp
     Parameters
     ----------
     peaks : ndarray of int64
-        Places of the maxima, rising.
+        Indices of the maxima, in increasing order.
     n_peaks, n_overlap : int
-        Maxima in a window, and maxima that consecutive windows share; 0 <= n_overlap < n_peaks.
+        Maxima per window, and maxima that consecutive windows share; 0 <= n_overlap < n_peaks.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""A user's own model, from a right-hand side and a few names: what ``model = "module:object"`` is.
+"""A user's model, ``model = "module:object"`` in a job, from a right-hand side and a few names.
 
-The module that a job names holds an `OwnModel`. From it come the axes that the job may have, the
-random initial states, and one `OwnPoint` for each point, which is all that the integrator, the
-store and the executors ask for.
+The module that a job names holds an `OwnModel`. It defines the axes that the job may have, the
+random initial states, and one `OwnPoint` for each point. The integrator, the store and the
+executors need nothing else.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ Initial: TypeAlias = Callable[[np.random.Generator, Row, int], ArrayLike]
 Observe: TypeAlias = Callable[[Array], tuple[ArrayLike, ArrayLike]]
 
 ARGUMENTS = ("y", "dy", "p", "ints")
-"""Arguments of a right-hand side; their names are free, their order is not."""
+"""Arguments of a right-hand side. The order is fixed, the names are free."""
 
 
 class OwnModel:
     r"""A model of N oscillators with n variables each, \dot y = f(y; p).
 
-    The right-hand side is a plain function with one signature. It works on several runs at once,
-    its *lanes*, which differ in state and real parameters and share the integers:
+    The right-hand side is a plain function with a fixed signature. It computes several runs at
+    once, its *lanes*, which differ in state and real parameters and share the integers:
 
         def rhs(y, dy, p, ints):
             n = ints[0]
@@ -45,16 +45,16 @@ class OwnModel:
                 for i in range(n):
                     dy[i, lane] = p[0, lane] - y[i, lane]
 
-    Row ``v * n_nodes + i`` of ``y`` and ``dy`` is variable v of node i. The model compiles it with
-    numba: strict IEEE arithmetic, no memory allocated inside, nothing kept on disk, so that a
-    process always runs the source as it is.
+    Row ``v * n_nodes + i`` of ``y`` and ``dy`` is variable v of node i. The model compiles the
+    function with numba: strict IEEE arithmetic, no memory allocation, no cache on disk. A process
+    therefore always runs the current source.
 
     Parameters
     ----------
     right_hand_side : function (y, dy, p, ints)
         ``y``, ``dy`` (n_variables * n_nodes, lanes) and ``p`` (n_p, lanes) are float64, ``ints`` is
-        int64. It fills all of ``dy`` and changes nothing else. A function that is jitted already is
-        compiled again from its source.
+        int64. The function sets all of ``dy`` and changes nothing else. If it is jitted already, it
+        is compiled again from its source.
     variables : sequence of str
         Names of the variables of a node.
     parameters : sequence of Parameter
@@ -62,7 +62,7 @@ class OwnModel:
         ``integers`` say otherwise, the real ones are the rows of ``p`` and the integer ones follow
         n_nodes in ``ints``, both in this order.
     n_nodes : int
-        Number of nodes where a job doesn't say.
+        Number of nodes if a job does not set it.
     initial : function (rng, row, n_nodes) -> (n_variables, n_nodes), optional
         Initial state from a `numpy.random.Generator` and the point's parameters by name (``delta``
         and ``seed`` included). Default: every variable uniform in the ball of ``integrator.delta``
@@ -72,16 +72,16 @@ class OwnModel:
         parameter; ``state`` is (n_variables, n_nodes, times), u and w are (n_nodes, times).
         Default: the first two variables; with a single name w is u.
     reals : function (row, n_nodes) -> (n_p,), optional
-        The column of ``p`` of a run: numbers prepared once, such as cosines or a matrix of weights.
+        The column of ``p`` of a run. It is computed once, e.g. cosines or a matrix of weights.
     integers : function (row, n_nodes) -> (k,), optional
-        What follows n_nodes in ``ints``: shapes and lists of neighbours of any network.
+        The numbers after n_nodes in ``ints``, e.g. shapes and lists of neighbours of a network.
     limits : sequence of Limit, optional
-        Bounds of one parameter by others, checked for every point of a plan.
+        Bounds of one parameter by others. They are checked for every point of a plan.
 
     Raises
     ------
     BadInput
-        Names that are wrong or double, a function with other arguments.
+        Invalid or repeated names, or a function with wrong arguments.
     """
 
     def __init__(
@@ -144,13 +144,13 @@ class OwnModel:
 
     @cached_property
     def compiled(self) -> Any:
-        """The right-hand side, compiled when first asked for.
+        """The right-hand side, compiled at first use.
 
         Raises
         ------
         BadInput
-            It doesn't compile, or calls a function that numba keeps on disk and would take from
-            there after an edit of what that function calls.
+            The function does not compile, or it calls a function that numba caches on disk. Such a
+            cache may be stale after an edit of what that function calls.
         """
         for helper in _helpers(self.function):
             # numba looks at the date of the helper's own file, not at what the helper calls.
@@ -162,7 +162,7 @@ class OwnModel:
         try:
             return compile_uncached(RIGHT_HAND_SIDE, self.function)
         except Exception as error:
-            # Whatever numba says of the user's code.
+            # numba may raise any exception for a user's code.
             raise BadInput(f"right_hand_side does not compile: {_in_short(error)}") from None
 
 
@@ -184,12 +184,12 @@ class OwnPoint:
 
     @property
     def n_second(self) -> int:
-        """Number of variables beside the first of each node."""
+        """Number of variables other than the first of each node."""
         return self.n_rows - self.n_nodes
 
     @property
     def lane_group(self) -> tuple[Any, ...]:
-        """What trajectories must share to run as lanes of one kernel call."""
+        """Key that trajectories must share to run as lanes of one kernel call."""
         return (self.name, self.int_params.tobytes(), len(self.lane_params))
 
     @property
@@ -198,7 +198,7 @@ class OwnPoint:
         return self.own.compiled
 
     def draw(self, stream: np.random.Generator) -> tuple[Array, Array] | None:
-        """Draw the initial state as the model says: first variable, others; None if it doesn't."""
+        """Draw the initial state of the model: first variable, others; None without `initial`."""
         if self.own.initial is None:
             return None
         state = np.asarray(self.own.initial(stream, self.row, self.n_nodes), dtype=np.float64)
@@ -218,11 +218,11 @@ class OwnPoint:
         return np.asarray(u, dtype=np.float64), np.asarray(w, dtype=np.float64)
 
     def second_variable(self, rows: Array, v0: Array, t: Array) -> Array:
-        """The variables beside the first of each node, shape (T, n_second)."""
+        """The variables other than the first of each node, shape (T, n_second)."""
         return rows[self.n_nodes :].T
 
     def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]:
-        """State that initial conditions are drawn around; only the origin is known."""
+        """Centre of the ball of initial states; "origin" is the only one."""
         if which != "origin":
             raise BadInput(f'integrator.centre = "{which}": a user\'s model knows "origin" only')
         return 0.0, 0.0
@@ -266,7 +266,7 @@ def _flat(name: str, values: ArrayLike, kind: type[Any]) -> NDArray[Any]:
 
 
 def _helpers(function: Any, known: set[int] | None = None) -> Iterator[Any]:
-    """Yield the jitted functions that a function calls, directly or through one another."""
+    """Yield the jitted functions that a function calls, directly or indirectly."""
     known = set() if known is None else known
     names = inspect.getclosurevars(function)
     for value in (*names.globals.values(), *names.nonlocals.values()):
@@ -277,7 +277,7 @@ def _helpers(function: Any, known: set[int] | None = None) -> Iterator[Any]:
 
 
 def _in_short(error: Exception) -> str:
-    """Return what matters of an error of numba on one line."""
+    """Return the essential part of a numba error on one line."""
     noise = ("Failed in nopython mode", "During:", "Enable logging", "<source", "^")
     lines = [line.strip() for line in str(error).splitlines()]
     lines = [line for line in lines if line and not line.startswith(noise)]

@@ -73,7 +73,7 @@ class NetworkedFHN:
 
     @property
     def lane_group(self) -> tuple[Any, ...]:
-        """What trajectories must share to run as lanes of one kernel call."""
+        """Key that trajectories must share to run as lanes of one kernel call."""
         return (self.name, self.n_nodes, self.half_degree)
 
     @property
@@ -108,7 +108,7 @@ class NetworkedFHN:
         return rows[self.n_nodes :].T
 
     def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]:
-        """State (x, y) that initial conditions are drawn around; only the origin is known."""
+        """Centre (x, y) of the ball of initial states; "origin" is the only one."""
         if which != "origin":
             raise BadInput(f'integrator.centre = "{which}": networked_fhn knows "origin" only')
         return 0.0, 0.0

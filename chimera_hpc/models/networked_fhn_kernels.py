@@ -28,8 +28,8 @@ from chimera_hpc.models.window_sums import (
 
 THIRD = 1.0 / 3.0
 AHEAD = 16
-"""Slopes are prefetched this many nodes ahead: the processor predicts what will be read, but not
-what will only be written."""
+"""Nodes by which slopes are prefetched. Processors predict reads, but not memory that is only
+written."""
 
 
 @jit()
@@ -65,7 +65,7 @@ def _node(zero, i, total_x, context):
 
 @jit()
 def _across(zero, state, slopes, params, ints):
-    # Node by node, in all lanes together; the sums of y wait in the place of y's slopes.
+    # Node by node, in all lanes together. The slopes of y first hold the sums of y.
     n, half = ints[0], ints[1]
     numbers = (
         load(zero, params, 0),

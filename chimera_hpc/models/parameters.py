@@ -1,4 +1,4 @@
-"""What a job may set of a model: names, defaults, bounds. No kernel is imported here."""
+"""Parameters of a model that a job may set: names, defaults, bounds. Imports no kernel."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Column: TypeAlias = NDArray[np.int64 | np.float64]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number that a job sets; the job must set it when `default` is None."""
+    """One number that a job sets. It is required if `default` is None."""
 
     name: str
     kind: type[int] | type[float]
@@ -31,14 +31,14 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """The values that `check` lets through, in words."""
+        """The values that `check` accepts, in words."""
         kind = "an integer" if self.kind is int else "a finite number"
         low = f" from {self.low:g}" if self.low > -math.inf else ""
         low = low or (f" above {self.above:g}" if self.above > -math.inf else "")
         return kind + low + (f" up to {self.high:g}" if self.high < math.inf else "")
 
     def check(self, value: object) -> int | float:
-        """Return the value as `kind` (an integer is a float too); BadInput when not allowed."""
+        """Return the value as `kind` (an int is a float too). Raises BadInput if not allowed."""
         number = self._number(value)
         if number is None or not (self.low <= number <= self.high and number > self.above):
             raise BadInput(f"{short(value)} is not {self.allowed}")
@@ -58,7 +58,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Limit:
-    """A bound by others: column `name` may be at most `highest(columns, n_nodes)`."""
+    """A bound by other parameters: column `name` is at most `highest(columns, n_nodes)`."""
 
     name: str
     needs: tuple[str, ...]
@@ -68,17 +68,17 @@ class Limit:
 
 @dataclass(frozen=True)
 class ModelParameters:
-    """All that a sweep has to know of a model before any kernel is loaded."""
+    """What a sweep needs to know of a model before it loads a kernel."""
 
     n_nodes: Parameter
     parameters: tuple[Parameter, ...]
     limits: tuple[Limit, ...] = ()
     forms: tuple[str, ...] = ("reduced",)
     constants: Mapping[str, int] = field(default_factory=dict)
-    """Columns that the model has no choice of, but that random streams and results want."""
+    """Columns that are fixed by the model but that random streams and results need."""
 
     def find(self, name: str) -> Parameter | None:
-        """Return the parameter that may be an axis or fixed, or None."""
+        """Return the parameter of this name, or None."""
         return next((p for p in self.parameters if p.name == name), None)
 
 

@@ -1,4 +1,4 @@
-"""What the integrator, the task and a job ask of a model."""
+"""What the integrator, a block of work and a job need of a model."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Row: TypeAlias = Mapping[str, int | float]
 
 
 class Model(Protocol):
-    """What the integrator and the task ask of a model with its parameters.
+    """A model with its parameters, as the integrator and a block of work need it.
 
-    ``right_hand_side`` is compiled with the signature `integrate.stepper.RIGHT_HAND_SIDE` and works
-    on (rows, lanes); ``int_params`` are shared by the lanes of a call, ``lane_params`` is one
-    lane's column. The first ``n_nodes`` rows are the observed signal u.
+    ``right_hand_side`` is compiled with the signature `integrate.stepper.RIGHT_HAND_SIDE`, for
+    arrays (rows, lanes). All lanes of a call share ``int_params``. ``lane_params`` is the column of
+    one lane. The first ``n_nodes`` rows are the observed signal u.
     """
 
     @property
@@ -47,7 +47,7 @@ class Model(Protocol):
 
 
 class ModelKind(Protocol):
-    """A model before its parameters are known: what the registry and a job's ``model`` name."""
+    """A model without values of its parameters, as the registry or a job's ``model`` names it."""
 
     @property
     def parameters(self) -> ModelParameters: ...
@@ -56,7 +56,7 @@ class ModelKind(Protocol):
 
 @dataclass(frozen=True)
 class BuiltIn:
-    """A model of this package: its table of parameters, and what builds it for one point."""
+    """A model of this package: its table of parameters, and the function that builds a point."""
 
     parameters: ModelParameters
     builder: Callable[[Any, Row], Model]

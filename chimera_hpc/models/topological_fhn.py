@@ -36,16 +36,15 @@ class TopologicalFHN:
         \epsilon \dot u_i = u_i - u_i^3/3 - (B_1 v)_i, \qquad
         \dot v_j = b + c v_j + (B_1^\top u)_j
 
-    with u on the N0 nodes and v on the N1 = N0 P links. The nodes see the links only through
-    w = B_1 v, and the link equation is linear, so multiplying it by B_1 gives the exact reduced
-    form
+    with u on the N0 nodes and v on the N1 = N0 P links. The links affect the nodes only through
+    w = B_1 v, and the link equation is linear. Multiplying it by B_1 gives the exact reduced form
 
     .. math::
         \epsilon \dot u = u - u^3/3 - w, \qquad
         \dot w = b s + c w + L_0 u, \qquad s = B_1 1, \quad L_0 = B_1 B_1^\top
 
-    of 2 N0 variables. The orientation enters through the divergence s alone. Time is in the
-    paper's units (dimensionless).
+    of 2 N0 variables. The orientation enters only through the divergence s. Time is dimensionless,
+    as in the paper.
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ class TopologicalFHN:
 
     @property
     def lane_group(self) -> tuple[Any, ...]:
-        """What trajectories must share to run as lanes of one kernel call."""
+        """Key that trajectories must share to run as lanes of one kernel call."""
         return (self.name, self.form, self.n_nodes, self.topology.half_degree)
 
     @property
@@ -139,7 +138,7 @@ class TopologicalFHN:
         -------
         shape (T, N1)
         """
-        # Here, since it takes a sixth of a second, which every worker would wait for.
+        # Imported here, because the import takes 0.17 s and workers do not need it.
         from scipy.special import exprel
 
         gradient = self.topology.spread_to_links(self.topology.solve_laplacian(w.T))
@@ -156,11 +155,11 @@ class TopologicalFHN:
         return self.links(second, v0, t) if self.form == "reduced" else second
 
     def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]:
-        """Homogeneous state (u, v) that initial conditions are drawn around.
+        """Homogeneous state (u, v), the centre of the ball of initial states.
 
         "upper" and "lower" are the stable equilibria u = +-sqrt(3), v = -b/c of an orientation
-        with zero divergence (paper sec. The model); "origin" is u = v = 0, where the paper's
-        simulations begin.
+        with zero divergence (paper sec. The model). "origin" is u = v = 0, as in the paper's
+        simulations.
         """
         if which == "origin":
             return 0.0, 0.0

@@ -30,7 +30,7 @@ THIRD = 1.0 / 3.0
 
 @jit()
 def _activator(u, w, rate):
-    # With the signs turned: (u^3 / 3 - u + w) * -rate.
+    # With opposite signs: (u^3 / 3 - u + w) * -rate.
     return fma(u, fma(u * u, THIRD, -1.0), w) * (-1.0 * rate)
 
 
@@ -39,7 +39,7 @@ def _recovery(u, w, source, total, width, c):
     return fma(c, w, source) - fma(-width, u, total)
 
 
-# (L0 u)_i = (2P + 1) u_i - sum_{|k| <= P} u_{i+k}, the sum being that of a sliding window.
+# (L0 u)_i = (2P + 1) u_i - sum_{|k| <= P} u_{i+k}; the sum is over a sliding window.
 
 
 @jit()
@@ -89,8 +89,8 @@ def _reduced_along(y, dy, params, ints):
 
 @jit()
 def _full(like, y, dy, params, ints):
-    # Rows of y: u (n), then v of link i * P + (k - 1) between i and i + k; its orientation is the
-    # sign in params: +1 when i is the tail.
+    # Rows of y: u (n), then v of link i * P + (k - 1) between i and i + k. Its orientation is the
+    # sign in params: +1 if i is the tail.
     n, half = ints[0], ints[1]
     rate, b, c = load(like, params, 0), load(like, params, 1), load(like, params, 2)
     for i in range(n):

@@ -1,4 +1,4 @@
-"""The old place of `chimera_hpc.models.custom`; read until version 0.3, with a warning."""
+"""Old name of `chimera_hpc.models.custom`, kept until version 0.3, with a warning."""
 
 import multiprocessing
 
@@ -7,6 +7,6 @@ from chimera_hpc.models.custom import Limit, OwnModel, OwnPoint, Parameter
 
 __all__ = ["Limit", "OwnModel", "OwnPoint", "Parameter"]
 
-# A worker process has a parent that has said it.
+# The parent of a worker process has already warned.
 if multiprocessing.parent_process() is None:
     warn("chimera_hpc.models.user", "chimera_hpc (from chimera_hpc import OwnModel, ...)")

@@ -1,9 +1,9 @@
 """Sums over a window that slides along a ring: T_i = sum_{|k| <= P} y_{i+k} for all nodes i.
 
-The window slides once, in strides of eight nodes: the changes y_{i+P} - y_{i-P-1} are summed within
-a stride (`simd.SCAN`), then added to the window's sum before it. A step costs the same for every P.
-Eight nodes of one trajectory are processed together (`changes_along`) as eight trajectories are
-(`stride_across`), with the same additions in the same order.
+The window slides once around the ring, in strides of eight nodes. The changes y_{i+P} - y_{i-P-1}
+are summed within a stride (`simd.SCAN`), then added to the window's sum before the stride. The cost
+of a step does not depend on P. Eight nodes of one trajectory (`changes_along`) and eight
+trajectories (`stride_across`) use the same additions in the same order.
 """
 
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from chimera_hpc.integrate.simd import (
 
 
 class Ring(NamedTuple):
-    """What the window slides along: ``n`` nodes of a state from row ``row`` on; ``half`` is P."""
+    """The ring along which the window slides: ``n`` rows from ``row`` on; ``half`` is P."""
 
     y: NDArray[np.float64]
     row: int
@@ -33,7 +33,7 @@ class Ring(NamedTuple):
 
 @jit()
 def _ends(ring, i):
-    # Nodes that come and go: T_i - T_{i-1} = y_{i+P} - y_{i-P-1}.
+    # Nodes that enter and leave the window: T_i - T_{i-1} = y_{i+P} - y_{i-P-1}.
     n, ahead, behind = ring.n, i + ring.half, i - ring.half - 1
     return ahead - n if ahead >= n else ahead, behind + n if behind < 0 else behind
 
@@ -51,7 +51,7 @@ def _around(zero, ring, i):
 
 @jit()
 def first_across(zero, ring):
-    """Return the sum T_{-1}: rows go to eight partial sums in turn, folded as in `simd.fold`."""
+    """Return T_{-1}. Rows are added to eight partial sums in turn, folded as in `simd.fold`."""
     s0, s1, s2, s3, s4, s5, s6, s7 = zero, zero, zero, zero, zero, zero, zero, zero
     start, end = ring.n - ring.half - 1, ring.n + ring.half
     whole = end - (2 * ring.half + 1) % 8
@@ -115,7 +115,7 @@ def _stride(zero, change, window, before, i, node, context):
 @jit(inline="always")
 def stride_across(zero, ring, before, i, node, context):
     """Call ``node(zero, j, T_j, context)`` for j = i ... i + 7, given T_{i-1}; returns T_{i+7}."""
-    # Where neither end of the window passes the ring's end, rows follow each other.
+    # Rows are contiguous if neither end of the window passes the end of the ring.
     ahead, behind = _ends(ring, i)
     if max(ahead, behind) + 8 <= ring.n:
         window = ring.y, ring.row + ahead, ring.row + behind
@@ -154,7 +154,7 @@ def rest_across(zero, ring, before, node, context):
 
 @jit()
 def _load_ring(ring, i):
-    # Eight neighbours from node i on, 0 <= i < 2n, over the end of the ring.
+    # Eight neighbours from node i on, 0 <= i < 2n, across the end of the ring.
     y, row, n, _ = ring
     i = i - n if i >= n else i
     if i + 8 <= n:

@@ -77,7 +77,7 @@ class Topology:
         """Reverse the links between ``node`` and its ``count`` nearest neighbours on either side.
 
         The paper's Q: for each k = 1..Q both the link from the node to node + k and the link from
-        node - k to the node turn round, 2 Q links in all (fig:orient, middle and right).
+        node - k to the node are reversed, 2 Q links in total (fig:orient, middle and right).
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Topology:
     def links_at(self, node: int = 0, reach: int | None = None) -> NDArray[np.int64]:
         """Indices (2 reach,) of a node's links to its ``reach`` nearest neighbours on either side.
 
-        First those ahead, then those behind; all 2 P unless told.
+        The links to the next nodes come first, then those to the previous ones. Default: all 2 P.
         """
         k = np.arange(1, (self.half_degree if reach is None else reach) + 1)
         ahead = node * self.half_degree + k - 1
@@ -108,12 +108,12 @@ class Topology:
     ) -> Topology:
         """Reverse ``count`` different links drawn uniformly (the paper's Q_r, sec:orient2).
 
-        They are drawn from all links, or from those with the indices ``among``.
+        They are drawn from all links, or from the links with indices ``among``.
 
         Raises
         ------
         BadInput
-            Unless 0 <= count <= N1, or the number of ``among``.
+            Unless 0 <= count <= N1, or <= the number of ``among`` if given.
         """
         n_links = self.n_links if among is None else len(among)
         if not 0 <= count <= n_links:
@@ -156,7 +156,7 @@ class Topology:
         return _eigenvalues(self.n_nodes, self.half_degree)
 
     def gather_links(self, v: Array) -> Array:
-        """B1 v: what the nodes see of link signals v (N1, ...); returns (N0, ...)."""
+        """B1 v, the divergence of link signals v (N1, ...) at the nodes; returns (N0, ...)."""
         gathered: Array = self.incidence @ v
         return gathered
 
@@ -177,7 +177,7 @@ class Topology:
         return v - self.spread_to_links(self.solve_laplacian(self.gather_links(v)))
 
 
-# Every point of a sweep has a ring of its own; most are of a few sizes.
+# Every point of a sweep has its own ring, but there are few different sizes.
 @lru_cache(maxsize=64)
 def _eigenvalues(n_nodes: int, half_degree: int) -> Array:
     m = np.arange(n_nodes)[:, None]
