@@ -101,5 +101,4 @@ def _plain_notes() -> Iterator[None]:
 
 def run() -> NoReturn:
     """Run the command line and leave with its exit status."""
-    status = main()
-    sys.exit(status)
+    sys.exit(main())

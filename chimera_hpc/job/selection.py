@@ -97,22 +97,13 @@ def check_figures(value: Any) -> Any:
 
 
 def check_analyses(value: Any) -> tuple[str, ...]:
-    """Return a tuple of known names of analyses. Raises BadInput for other names."""
-    names = _texts(value)
-    if names is None:
-        raise BadInput(f"reduction.analyses: {short(value)} is not a list of names")
-    for name in names:
-        check_name("reduction.analyses", "an analysis", name, ANALYSES)
-    return names
+    """Return a tuple of known names of analyses; BadInput for others."""
+    return _known_names("reduction.analyses", "an analysis", value, ANALYSES)
 
 
 def check_measures(value: Any) -> tuple[str, ...]:
-    """Return a tuple of different known names of measures. Raises BadInput for other names."""
-    names = _texts(value)
-    if names is None:
-        raise BadInput(f"measures.panel: {short(value)} is not a list of names")
-    for name in names:
-        check_name("measures.panel", "a measure", name, MEASURES)
+    """Return a tuple of different known names of measures; BadInput for others."""
+    names = _known_names("measures.panel", "a measure", value, MEASURES)
     if len(set(names)) < len(names):
         raise BadInput(f"measures.panel: {short(list(names))} holds a name twice")
     if names[:1] != ("variations",):
@@ -124,6 +115,16 @@ def check_name(key: str, kind: str, name: str, known: Iterable[str]) -> None:
     """Raise BadInput, with the nearest known name, if the name is not known."""
     if name not in known:
         raise BadInput(f"{key}: {short(name)} is not {kind}{nearest(name, list(known))}")
+
+
+def _known_names(key: str, kind: str, value: Any, known: Mapping[str, str]) -> tuple[str, ...]:
+    """Return a tuple of names that a registry has."""
+    names = _texts(value)
+    if names is None:
+        raise BadInput(f"{key}: {short(value)} is not a list of names")
+    for name in names:
+        check_name(key, kind, name, known)
+    return names
 
 
 def _texts(value: Any) -> tuple[str, ...] | None:

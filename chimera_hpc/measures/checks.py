@@ -23,13 +23,15 @@ def floats(name: str, values: ArrayLike) -> Array:
     """
     if np.ma.is_masked(values):
         raise BadInput(f"{name} holds masked values: interpolate them or leave them out")
+    kind = ""
     try:
         array = np.asarray(values)
-        if array.dtype.kind not in "biufO":
-            raise BadInput(f"{name} must be an array of real numbers, not {array.dtype}")
-        return np.asarray(array, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise BadInput(f"{name} must be an array of real numbers") from error
+        if array.dtype.kind in "biufO":
+            return np.asarray(array, dtype=np.float64)
+        kind = f", not {array.dtype}"
+    except (TypeError, ValueError):
+        pass  # rows of several lengths, or objects that are no numbers
+    raise BadInput(f"{name} must be an array of real numbers{kind}")
 
 
 def node_rows(name: str, values: ArrayLike) -> Array:

@@ -120,12 +120,15 @@ def suspects(u: Array, names: Sequence[str]) -> list[str]:
     """Return a line for each kind of node that seems to be none: still, rising, doubled."""
     lines = []
     spread = np.nanstd(u, axis=0)
-    still = np.flatnonzero(spread <= _STILL * float(np.median(spread))).tolist()
-    if 0 < len(still) < u.shape[1]:
-        lines.append(_drop([names[i] for i in still], "hardly varies beside the others"))
+    still = spread <= _STILL * float(np.median(spread))
+    if still.all():
+        still[:] = False
+    if still.any():
+        where = np.flatnonzero(still).tolist()
+        lines.append(_drop([names[i] for i in where], "hardly varies beside the others"))
     steps = np.diff(u, axis=0)
     one_way = ((steps >= 0.0) | np.isnan(steps)).all(0) | ((steps <= 0.0) | np.isnan(steps)).all(0)
-    rising = np.flatnonzero(one_way & (spread > 0.0)).tolist()
+    rising = np.flatnonzero(one_way & (spread > 0.0) & ~still).tolist()
     if len(rising) and len(u) >= _FEWEST:
         lines.append(_drop([names[i] for i in rising], "rises or falls throughout"))
     first: dict[bytes, int] = {}

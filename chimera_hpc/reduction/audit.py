@@ -32,9 +32,9 @@ from chimera_hpc.classify.resampling import (
     kept_shares,
     spread_sample,
 )
-from chimera_hpc.reduction.audit_runs import WAYS, Runs, compute_again, described
+from chimera_hpc.reduction.audit_runs import WAYS, Runs, compute_again, described, runs_of
 from chimera_hpc.reduction.cells import free_axes
-from chimera_hpc.reduction.results import TRIPLET, count_points, json_safe, read_results, to_json
+from chimera_hpc.reduction.results import count_points, json_safe, read_results, to_json
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import StoredReduction
 from chimera_hpc.store.store import Store
@@ -81,6 +81,8 @@ class Labeller:
         The first atlas that the job names, else the sweep's own; none where it maps a basin.
         """
         if "basin" in store.sweep.reduction.analyses:
+            if "distance" not in store.sweep.measures.panel:
+                raise BadInput("measures.panel: the basin of a sweep needs the measure distance")
             return cls("inside or outside the ball of initial states", None)
         for name, atlas in others.items():
             return cls(f"the classes of {name}", atlas)
@@ -220,8 +222,7 @@ def _standing(folder: Path, results: Mapping[str, Any]) -> tuple[Basis, Runs]:
     }
     own = Atlas.from_arrays(stored.arrays, stored.attributes)
     judge = Labeller.of(store, own, _other_atlas(stored))
-    triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
-    runs = Runs(ledger["status"], triplets, scalars["distance"], ledger["steps"])
+    runs = runs_of(ledger["status"], scalars, ledger["steps"])
     return basis_of(store, ledger, runs, cuts, judge), runs
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -128,14 +128,14 @@ def compute_piece(path: Path, chosen: Integers, way: str) -> Runs:
     store = Store.open(path)
     sweep, nudge = variant(store.sweep, way)
     made = run_block(sweep, store.points[chosen], nudge=nudge)
-    return runs_of(made.status, made.scalars, made.steps, sweep)
+    scalars = dict(zip(scalar_labels(sweep), made.scalars.T, strict=True))
+    return runs_of(made.status, scalars, made.steps)
 
 
-def runs_of(status: Integers, scalars: NDArray[np.float64], steps: Integers, sweep: Sweep) -> Runs:
-    """Pick out what labels need; `scalars` (n, n_scalars) as in a store."""
-    place = {label: k for k, label in enumerate(scalar_labels(sweep))}
-    triplets = scalars[:, [place[name] for name in TRIPLET]]
-    return Runs(status, triplets, scalars[:, place["distance"]], steps)
+def runs_of(status: Integers, scalars: Mapping[str, NDArray[np.float64]], steps: Integers) -> Runs:
+    """Pick out what labels need of scalars (n,) by name; the distance is NaN if it is not there."""
+    triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
+    return Runs(status, triplets, scalars.get("distance", np.full(len(status), np.nan)), steps)
 
 
 def _in_turn(tasks: Sequence[Task], on_piece: Callable[[int], None]) -> Iterator[Runs]:

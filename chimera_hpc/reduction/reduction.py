@@ -18,7 +18,7 @@ from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.modes import run_names
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
-from chimera_hpc.reduction.audit_runs import Runs
+from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.record import reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
@@ -157,7 +157,7 @@ class _Work:
         """What an audit of these classes stands on."""
         cuts = {k: (cut.labels, cut.names) for k, cut in self.classification.cuts.items()}
         judge = Labeller.of(self.store, Atlas.of(self.classification), self.atlases)
-        runs = Runs(self.status, self.triplets, self.scalars["distance"], self.ledger["steps"])
+        runs = runs_of(self.status, self.scalars, self.ledger["steps"])
         return basis_of(self.store, self.ledger, runs, cuts, judge)
 
     def _analyses(self) -> dict[str, Any]:

@@ -222,3 +222,15 @@ def test_ctrl_c_leaves_results_as_they_were(
     assert (code, err) == (130, "")
     assert (finished / "results.json").read_bytes() == before
     assert not list(finished.glob(".*.partial"))
+
+
+def test_a_sweep_that_does_not_measure_the_distance_is_audited(
+    job: Path, tmp_path: Path, sweep: Run
+) -> None:
+    out = tmp_path / "panel"
+    words = ("--set", 'measures.panel=["variations"]', "--cluster", "serial", "--no-figures")
+    assert sweep("run", job, "--out", out, *words)[0] == 0
+    code, text, error = sweep("audit", out, "--workers", 1, "--points", 3, "--no-figures")
+    assert (code, error) == (0, "")
+    assert results_of(out)["audit"]["points"] == 3
+    assert "tighter" in text

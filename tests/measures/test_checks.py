@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from chimera_hpc.measures.checks import node_rows
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.measures.checks import floats, node_rows
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
@@ -23,3 +24,12 @@ def test_a_protected_recording_is_copied_and_stays_protected():
     rows = node_rows("u", u)
     rows[0, 0] = 1.0
     assert not u.any()
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"), [([1j], "complex128"), (np.array(["2026-01-01"], "M8[D]"), "datetime64[D]")]
+)
+def test_what_is_not_real_is_named(values, kind):
+    with pytest.raises(BadInput) as caught:
+        floats("u", values)
+    assert str(caught.value) == f"u must be an array of real numbers, not {kind}"

@@ -101,6 +101,15 @@ def test_node_with_the_values_of_another_is_named():
     assert made.warnings == (wanted,)
 
 
+def test_a_constant_channel_is_named_once(tmp_path: Path):
+    u = U.copy()
+    u[:, 3] = 3.2  # its mean is not exact, so that its spread is not 0
+    np.savez(tmp_path / "u.npz", t=T, u=u)
+    made = prepare(with_times(read_recording(tmp_path / "u.npz", Choice()), None), None)
+    (line,) = [line for line in made.warnings if "--drop 3" in line]
+    assert "hardly varies" in line
+
+
 def test_rows_of_nodes_are_refused_until_turned(tmp_path: Path):
     np.save(tmp_path / "u.npy", U.T)
     with pytest.raises(BadInput, match="--transpose turns them"):
