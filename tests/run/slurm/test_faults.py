@@ -175,7 +175,6 @@ def test_a_job_near_its_limit_says_that_there_is_more_to_do_and_the_next_one_end
     assert_whole(out, alone, before)
 
 
-@pytest.mark.xfail(strict=False, reason="SLURM may hold a requeued job for minutes")
 def test_a_job_near_its_limit_goes_on_as_the_same_job_until_the_sweep_is_reduced(
     slurm: Slurm, unhurried: tuple[Path, Path], tmp_path: Path
 ) -> None:
