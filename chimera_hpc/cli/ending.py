@@ -50,8 +50,6 @@ def end(driver: Driver, folder: Path, args: Namespace) -> int:
 
 def interrupted(stop: StopRequest, args: Namespace) -> int:
     """Say how to go on after work was broken off by a signal, and return the exit status."""
-    if not stop():
-        raise KeyboardInterrupt
     print(f"broken off; to go on:\n  {again_command(args)}")
     return stop.exit_status
 

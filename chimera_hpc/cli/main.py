@@ -101,4 +101,8 @@ def _plain_notes() -> Iterator[None]:
 
 def run() -> NoReturn:
     """Run the command line and leave with its exit status."""
-    sys.exit(main())
+    status = main()
+    # A KeyboardInterrupt out of text that Python compiled has it end by SIGINT, although it was
+    # caught, until it compiles another one.
+    eval("0")
+    sys.exit(status)

@@ -84,7 +84,9 @@ def execute(args: Namespace) -> int:
             driver.meanwhile = load_reduction
             driver.work()
             return end(driver, path.parent, args)
-        except KeyboardInterrupt:
+        except BaseException:
+            if not stop.broke_off:
+                raise
             return interrupted(stop, args)
 
 

@@ -73,7 +73,9 @@ def execute(args: Namespace) -> int:
                 driver.report = LiveReport(folder, store.n_points)
             driver.work()
             return go_on(end(driver, folder, args), driver, args.resubmit)
-        except KeyboardInterrupt:
+        except BaseException:
+            if not stop.broke_off:
+                raise
             return interrupted(stop, args)
 
 

@@ -68,8 +68,8 @@ def execute(args: Namespace) -> int:
             driver = Driver(store, ExecutorChoice("serial", share=share), stop, log, retry)
             driver.work()
             return go_on(_end(driver), driver, args.resubmit)
-        except KeyboardInterrupt:
-            if not stop():
+        except BaseException:
+            if not stop.broke_off:
                 raise
             return stop.exit_status
 

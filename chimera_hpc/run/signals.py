@@ -18,6 +18,8 @@ class StopRequest:
     def __init__(self) -> None:
         self.asked: list[int] = []
         self.in_order = False
+        self.broke_off = False
+        """Whether a signal raised KeyboardInterrupt; other packages may turn that into an error."""
 
     def __call__(self) -> bool:
         """Return whether to stop."""
@@ -42,6 +44,7 @@ class StopRequest:
         again = number == signal.SIGINT and bool(self.asked)
         self.asked.append(number)
         if again or not self.in_order:
+            self.broke_off = True
             raise KeyboardInterrupt
 
 

@@ -7,6 +7,8 @@ import json
 import os
 import re
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -374,3 +376,31 @@ def test_plan_that_does_not_fit_on_the_disk_is_refused(
     code, _, err = sweep("plan", job)
     assert code == 2
     assert "may be needed, 1 kB are free" in err
+
+
+def test_a_ctrl_c_that_another_package_makes_an_error_of_is_a_ctrl_c(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wrapped(*_: Any) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise RuntimeError("a schema could not be built") from error
+
+    monkeypatch.setattr("chimera_hpc.cli.run.load_job", wrapped)
+    code, out, _ = sweep("run", job, "--out", tmp_path / "out", "--cluster", "serial")
+    assert code == 130
+    assert "broken off; to go on:" in out
+
+
+def test_a_ctrl_c_inside_of_compiled_text_leaves_the_status_of_any_other(tmp_path: Path) -> None:
+    program = (
+        "import sys\n"
+        "from chimera_hpc.cli import main, run\n"
+        "text = 'import signal; signal.raise_signal(signal.SIGINT)'\n"
+        "run.load_job = lambda *_: exec(text)\n"
+        "sys.argv = ['sweep', 'run', 'quickstart', '--cluster', 'serial']\n"
+        "main.run()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True)
+    assert done.returncode == 130
