@@ -402,5 +402,7 @@ def test_a_ctrl_c_inside_of_compiled_text_leaves_the_status_of_any_other(tmp_pat
         "sys.argv = ['sweep', 'run', 'quickstart', '--cluster', 'serial']\n"
         "main.run()\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True)
+    (tmp_path / "interrupted_run.py").write_text(program)
+    command = [sys.executable, "-m", "interrupted_run"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True)
     assert done.returncode == 130
