@@ -43,7 +43,9 @@ def test_the_thinned_reproduction_ends_well_and_keeps_the_claims_that_survive(
     tmp_path: Path,
 ) -> None:
     command = [sys.executable, "-P", "-m", "scoreboard.reproduce", "--quick"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "jobs/paper")])
+    }
     ended = subprocess.run(
         [*command, "--out", str(tmp_path), "--workers", "2"],
         env=environment,
