@@ -56,10 +56,7 @@ def density_classes(values: ArrayLike, bandwidth: float | None = None) -> Densit
     same number of modes. Values that are not finite get label -1. Steady runs have sigma_l near 0
     and should be included.
 
-    Raises
-    ------
-    BadInput
-        Fewer than two finite values, or a bandwidth that is not positive.
+    Raises BadInput: fewer than two finite values, or a bandwidth that is not positive.
     """
     data = np.asarray(values, dtype=np.float64).ravel()
     finite = np.isfinite(data)

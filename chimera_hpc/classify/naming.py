@@ -18,10 +18,8 @@ Rule = str | Sequence[str]
 def base_size(rule: Rule) -> int:
     """Return the number of clusters of the base cut, which `rule` names directly.
 
-    Raises
-    ------
-    BadInput
-        For an unknown rule, or a list of names that is empty, repeats one, or holds a reserved one.
+    Raises BadInput for an unknown rule, or a list of names that is empty, repeats one, or holds a
+    reserved one.
     """
     if isinstance(rule, str):
         if rule != "triplet":

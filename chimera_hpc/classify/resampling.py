@@ -64,17 +64,11 @@ def kept_shares(
     The n runs of a cell are drawn n times with replacement (the bootstrap, Efron 1979,
     doi:10.1214/aos/1176344552): the votes of a draw are multinomial with probabilities votes / n.
 
-    Parameters
-    ----------
-    votes : (n_cells, k + 2)
-        Runs by class, then steady ones and those without a window, as for `modal_votes`.
-    sizes : (k,)
-        Members of each class in the whole sweep, which decide ties.
+    votes (n_cells, k + 2): runs by class, then steady ones and those without a window, as for
+        `modal_votes`.
+    sizes (k,): members of each class in the whole sweep, which decide ties.
 
-    Returns
-    -------
-    (n_cells,)
-        NaN for a cell with fewer than two runs.
+    Returns (n_cells,): NaN for a cell with fewer than two runs.
     """
     total, modal = votes.sum(axis=1), modal_votes(votes, sizes)
     kept = np.full(len(votes), np.nan)
@@ -91,12 +85,8 @@ def spread_sample(cell: Integers, usable: Integers, size: int, seed: int) -> Int
     first point, then each gives its second, and so on. A larger sample with the same seed contains
     the smaller one.
 
-    Parameters
-    ----------
-    cell : (n,)
-        Cell of each point of the sweep.
-    usable : (m,)
-        Points to choose from.
+    cell (n,): cell of each point of the sweep.
+    usable (m,): points to choose from.
     """
     order = np.random.default_rng(seed).permutation(usable)
     by_cell = np.argsort(cell[order], kind="stable")

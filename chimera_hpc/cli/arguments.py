@@ -81,10 +81,7 @@ def add_point(parser: ArgumentParser) -> None:
 def find_points(store: Store, words: Sequence[str]) -> list[int]:
     """Return the points of a store that words such as ``P=3 seed=7`` select.
 
-    Raises
-    ------
-    BadInput
-        For an unknown name, a value that is none, or when there is no such point.
+    Raises BadInput for an unknown name, a value that is none, or when there is no such point.
     """
     from chimera_hpc.reduction.selection import find_points as find
 
@@ -225,10 +222,7 @@ def sweep_folder(out: Path | None, sweep: Sweep) -> Path:
 def store_path(folder: Path) -> Path:
     """Return the store in a sweep's folder.
 
-    Raises
-    ------
-    BadInput
-        When there is none.
+    Raises BadInput when there is none.
     """
     store = folder if (folder / "zarr.json").is_file() else folder / STORE
     if not store.is_dir():

@@ -240,26 +240,15 @@ def integrate(
 
     The bits of a trajectory do not depend on the others, nor on the number of lanes.
 
-    Parameters
-    ----------
-    systems : sequence
-        One per trajectory, equal in right-hand side and integer parameters.
-    states : sequence of shape (n_rows,)
-        Initial states, or a function that returns the state for the number of a trajectory.
-    control : Control
-    n_observed : int
-        The first ``n_observed`` rows are sampled.
-    on_end : callable
-        Called with (number, `Outcome`) as each trajectory ends, in order of ending.
-    should_stop : callable, optional
-        Called about ten times per second. If it returns true, `Stopped` is raised.
-    lanes : int, optional
-        1 or `LANES`. Default: see `choose_lanes`.
+    systems: one per trajectory, equal in right-hand side and integer parameters.
+    states (n_rows,): initial states, or a function that returns the state for the number of a
+        trajectory.
+    n_observed: the first ``n_observed`` rows are sampled.
+    on_end: called with (number, `Outcome`) as each trajectory ends, in order of ending.
+    should_stop: called about ten times per second. If it returns true, `Stopped` is raised.
+    lanes: 1 or `LANES`. Default: see `choose_lanes`.
 
-    Raises
-    ------
-    Stopped
-        ``should_stop`` returned true.
+    Raises Stopped: ``should_stop`` returned true.
     """
     if not systems:
         return

@@ -59,10 +59,7 @@ def user_model(name: str) -> Any:
     `chimera_hpc.models.custom.OwnModel` provides both. The module is searched for on the Python
     path first, then in the folders of `look_in`, also by the workers.
 
-    Raises
-    ------
-    BadInput
-        The module does not exist or cannot be imported, or the object is not a model.
+    Raises BadInput: the module does not exist or cannot be imported, or the object is not a model.
     """
     module, _, attribute = name.partition(":")
     where = f"model: {short(name)}"

@@ -115,19 +115,13 @@ def expand(
 ) -> dict[str, Column]:
     """Return the product of the axes as columns, the first axis slowest.
 
-    Parameters
-    ----------
-    axes : mapping of str to Axis
-        In order of declaration. The values of a dependent axis are computed for each value of the
+    axes: in order of declaration. The values of a dependent axis are computed for each value of the
         axes it names.
-    check : callable
-        Called with the name of each new column and the columns so far, in order of dependence. It
-        can raise before a later axis makes the product large.
+    check: called with the name of each new column and the columns so far, in order of dependence.
+        It can raise before a later axis makes the product large.
 
-    Raises
-    ------
-    BadInput
-        More than `MAX_POINTS` rows, a circular dependency, or an empty dependent range.
+    Raises BadInput: more than `MAX_POINTS` rows, a circular dependency, or an empty dependent
+    range.
     """
     order = dependency_order(axes)
     columns: dict[str, Column] = {}

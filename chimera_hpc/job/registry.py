@@ -112,10 +112,7 @@ def load(place: str) -> Any:
 def method(name: str) -> Tableau:
     """Return the Runge-Kutta pair of this name.
 
-    Raises
-    ------
-    BadInput
-        The pair was removed.
+    Raises BadInput: the pair was removed.
     """
     if name in REMOVED_METHODS:
         instead = REMOVED_METHODS[name]

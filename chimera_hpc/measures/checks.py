@@ -15,11 +15,8 @@ Array = NDArray[np.float64]
 def floats(name: str, values: ArrayLike) -> Array:
     """Return values of any shape as float64.
 
-    Raises
-    ------
-    BadInput
-        The values are not real numbers (complex, dates, words), some are masked, or the rows differ
-        in length.
+    Raises BadInput: the values are not real numbers (complex, dates, words), some are masked, or
+    the rows differ in length.
     """
     if np.ma.is_masked(values):
         raise BadInput(f"{name} holds masked values: interpolate them or leave them out")
@@ -40,10 +37,7 @@ def node_rows(name: str, values: ArrayLike) -> Array:
     An array whose transpose is contiguous is not copied, unless it is read-only. Kernels would be
     compiled again for read-only arrays.
 
-    Raises
-    ------
-    BadInput
-        The shape is not (T, N) with T, N >= 1; or as `floats`.
+    Raises BadInput: the shape is not (T, N) with T, N >= 1; or as `floats`.
     """
     array = floats(name, values)
     if array.ndim != 2 or array.size == 0:
@@ -55,10 +49,7 @@ def node_rows(name: str, values: ArrayLike) -> Array:
 def integer(name: str, value: int) -> int:
     """Return the value as int.
 
-    Raises
-    ------
-    BadInput
-        The value is not a whole number.
+    Raises BadInput: the value is not a whole number.
     """
     try:
         return operator.index(value)

@@ -22,18 +22,11 @@ def quantise(
 
     A value that is NaN or needs more than ``-missing - 1`` steps is stored as ``missing``.
 
-    Parameters
-    ----------
-    rows : shape (N, T)
-        The series. Fastest if it is contiguous in the nodes, as the integrator writes it.
-    stored : int16, shape (T, N)
-    back : shape (N, T)
-        Set to ``stored * scale``.
+    rows (N, T): the series. Fastest if it is contiguous in the nodes, as the integrator writes it.
+    stored (T, N): int16
+    back (N, T): set to ``stored * scale``.
 
-    Returns
-    -------
-    int
-        Number of missing values. Their entries in ``back`` are undefined.
+    Returns the number of missing values. Their entries in ``back`` are undefined.
     """
     number: int = _quantise(*_time_by_time(rows), scale, missing, stored, back)
     return number

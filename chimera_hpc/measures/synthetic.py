@@ -30,10 +30,7 @@ def synthetic_profiles(n_nodes: int = 100) -> Profiles:
         a_0     = 1 + 20 bump(s) ,
         Omega_0 = 1 + 0.1 bump(s) in the second and the fourth fifth, 1 in the others.
 
-    Raises
-    ------
-    BadInput
-        n_nodes below 1.
+    Raises BadInput: n_nodes below 1.
     """
     if n_nodes < 1:
         raise BadInput(f"n_nodes must be at least 1, not {n_nodes}")
@@ -51,15 +48,9 @@ def synthetic_profiles(n_nodes: int = 100) -> Profiles:
 def synthetic_signal(t: ArrayLike, n_nodes: int = 100) -> Array:
     """Samples (T, N) of x_j(t) = a_0(j) cos(2 pi Omega_0(j) t + theta_0(j)), eq:syntsig.
 
-    Parameters
-    ----------
-    t : array_like, shape (T,)
-        Times; the paper takes [500, 1000].
+    t (T,): times; the paper takes [500, 1000].
 
-    Raises
-    ------
-    BadInput
-        n_nodes below 1.
+    Raises BadInput: n_nodes below 1.
     """
     amplitude, frequency, phase = (profile[:, None] for profile in synthetic_profiles(n_nodes))
     times = np.asarray(t, dtype=np.float64)

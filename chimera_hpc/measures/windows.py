@@ -41,17 +41,8 @@ def maxima(x: NDArray[np.float64]) -> Samples:
     plateau) gives one index, that of its middle, rounded down. The first and the last sample of the
     signal are never maxima.
 
-    Parameters
-    ----------
-    x : ndarray, shape (T,)
-        Samples, finite.
+    x (T,) must be finite. Returns an increasing array of int64.
 
-    Returns
-    -------
-    ndarray of int64, increasing
-
-    Examples
-    --------
     >>> maxima(np.array([0.0, 1.0, 0.0, 2.0, 2.0, 1.0, 3.0]))
     array([1, 3])
     """
@@ -62,20 +53,12 @@ def maxima(x: NDArray[np.float64]) -> Samples:
 def windows(peaks: Samples, n_peaks: int, n_overlap: int) -> tuple[Samples, Samples]:
     """First and last sample of each complete window over a list of maxima.
 
-    Parameters
-    ----------
-    peaks : ndarray of int64
-        Indices of the maxima, in increasing order.
-    n_peaks, n_overlap : int
-        Maxima per window, and maxima that consecutive windows share; 0 <= n_overlap < n_peaks.
+    peaks: indices of the maxima, in increasing order.
+    n_peaks, n_overlap: maxima per window, and maxima that consecutive windows share; 0 <= n_overlap
+        < n_peaks.
 
-    Returns
-    -------
-    first, last : ndarray of int64, shape (q,)
-        q = 0 where there are fewer than n_peaks maxima.
+    Returns first and last, both (q,); q = 0 where there are fewer than n_peaks maxima.
 
-    Examples
-    --------
     >>> windows(np.array([10, 20, 30, 40, 50, 60]), n_peaks=3, n_overlap=1)
     (array([10, 30]), array([30, 50]))
     """

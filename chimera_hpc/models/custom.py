@@ -146,11 +146,8 @@ class OwnModel:
     def compiled(self) -> Any:
         """The right-hand side, compiled at first use.
 
-        Raises
-        ------
-        BadInput
-            The function does not compile, or it calls a function that numba caches on disk. Such a
-            cache may be stale after an edit of what that function calls.
+        Raises BadInput: the function does not compile, or it calls a function that numba caches on
+        disk. Such a cache may be stale after an edit of what that function calls.
         """
         for helper in _helpers(self.function):
             # numba looks at the date of the helper's own file, not at what the helper calls.

@@ -48,10 +48,7 @@ def animate_ring(
     On the ring, node 1 is on the right and the others follow counter-clockwise; u moves a node
     outwards and gives its colour, which it keeps in the plane (u, w).
 
-    Raises
-    ------
-    BadInput
-        As `check_film`.
+    Raises BadInput: as `check_film`.
     """
     check_film(path)
     time, across, along = (np.asarray(x, dtype=np.float64) for x in (t, u, w))

@@ -26,16 +26,11 @@ def ring_portrait(
 ) -> Figure:
     """Draw the orbit of one node (0-based) over those of all, and all nodes at the last time.
 
-    Parameters
-    ----------
-    t : shape (T,)
-    u, w : shape (T, N)
-    node : int
-        Its whole orbit is drawn; of the others, in grey, the last turns.
-    nullcline : bool
-        Whether the model has the cubic nullcline w = u - u^3 / 3.
-    period : float, optional
-        Length of a turn; without it the others are drawn whole.
+    t: (T,)
+    u, w: (T, N)
+    node: its whole orbit is drawn; of the others, in grey, the last turns.
+    nullcline: whether the model has the cubic nullcline w = u - u^3 / 3.
+    period: length of a turn; without it the others are drawn whole.
     """
     figure, (axes,) = style.new_panels(1, style.COLUMN + 1.6, 3.2)
     time, across, along = (np.asarray(x, dtype=np.float64) for x in (t, u, w))

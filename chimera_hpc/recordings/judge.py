@@ -117,21 +117,11 @@ def measure(
 ) -> Measured:
     """Measure signals on an even grid, and judge them by an atlas if there is one.
 
-    Parameters
-    ----------
-    made : Prepared
-    settings : Features
-        Windows, clock and the other settings; ``start`` and ``groups`` are not used.
-    ring : bool
-        Whether the last node is a neighbour of the first.
-    judge : Judge or None
-    absolute : bool
-        Whether the user sets ``steady_threshold``, in the unit of the signal.
+    settings: windows, clock and the other settings; ``start`` and ``groups`` are not used.
+    ring: whether the last node is a neighbour of the first.
+    absolute: whether the user sets ``steady_threshold``, in the unit of the signal.
 
-    Raises
-    ------
-    BadInput
-        Fewer than three nodes (two for a chain), or as `fourier_features`.
+    Raises BadInput: fewer than three nodes (two for a chain), or as `fourier_features`.
     """
     n_nodes, least = made.u.shape[1], 3 if ring else 2
     if n_nodes < least:

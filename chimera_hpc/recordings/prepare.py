@@ -33,18 +33,11 @@ _MOST = 2 * 10**8
 class Prepared:
     """Signals ready to be measured.
 
-    Attributes
-    ----------
-    t, u : shape (T,), (T, N)
-        Even times, finite values.
-    step, recorded_step : float
-        Step of these times, and of the recording.
-    names : tuple of str
-        Names of the nodes, in the order of the columns.
-    gaps : tuple of Gap
-        All that is missing in the recording, longest first.
-    notes, warnings : tuple of str
-        What was done, and what speaks against it, a line each.
+    t (T,), u (T, N): even times, finite values.
+    step, recorded_step: step of these times, and of the recording.
+    names: names of the nodes, in the order of the columns.
+    gaps: all that is missing in the recording, longest first.
+    notes, warnings: what was done, and what speaks against it, a line each.
     """
 
     t: Array
@@ -60,10 +53,7 @@ class Prepared:
 def with_times(recording: Recording, step: float | None) -> Recording:
     """Give a recording without times those of `step`.
 
-    Raises
-    ------
-    BadInput
-        Neither has times, or both; times that are not finite or do not rise.
+    Raises BadInput: neither has times, or both; times that are not finite or do not rise.
     """
     own = recording.t is not None
     if step is None or (np.isfinite(step) and step > 0.0):
@@ -115,28 +105,17 @@ def prepare(
 ) -> Prepared:
     """Cut out what is whole and put it on an even grid.
 
-    Parameters
-    ----------
-    recording : Recording
-        With times.
-    step : float or None
-        Step of the grid, None for the recording's own. A recording that has this step is taken as
+    recording: with times.
+    step: step of the grid, None for the recording's own. A recording that has this step is taken as
         it is; any other is interpolated by cubic splines.
-    span : (float, float)
-        First and last time to take, None for the recording's own.
-    bridge : int
-        Samples that may be missing in a row: they are interpolated. At a longer gap the recording
-        is cut, and its longest part taken.
-    scale : (float, float)
-        Factors on times and on signals.
-    lowpass : float, optional
-        Frequency, in the recording's unit, above which signals are damped, without a shift of
+    span: first and last time to take, None for the recording's own.
+    bridge: samples that may be missing in a row: they are interpolated. At a longer gap the
+        recording is cut, and its longest part taken.
+    scale: factors on times and on signals.
+    lowpass: frequency, in the recording's unit, above which signals are damped, without a shift of
         phase: a Butterworth filter of order 4 that runs forwards and backwards.
 
-    Raises
-    ------
-    BadInput
-        Nothing is left, or ``lowpass`` is not below half the sampling frequency.
+    Raises BadInput: nothing is left, or ``lowpass`` is not below half the sampling frequency.
     """
     assert recording.t is not None
     t, u = recording.t * scale[0], np.where(np.isfinite(recording.u), recording.u, np.nan)

@@ -29,18 +29,11 @@ _ZARR = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
 def read_recording(path: Path, choice: Choice) -> Recording:
     """Read a time series, time by node.
 
-    Parameters
-    ----------
-    path : Path
-        .npz, .npy, .csv (.tsv, .txt, .dat; also .gz), .mat, .nc (NetCDF), or the folder of a
-        Zarr store.
-    choice : Choice
+    path: .npz, .npy, .csv (.tsv, .txt, .dat; also .gz), .mat, .nc (NetCDF), or the folder of a Zarr
+        store.
 
-    Raises
-    ------
-    BadInput
-        No such file, another format, a file with pickled objects, or one that leaves open what the
-        signals or the times are.
+    Raises BadInput: no such file, another format, a file with pickled objects, or one that leaves
+    open what the signals or the times are.
     """
     try:
         if (path / "store.zarr").is_dir():

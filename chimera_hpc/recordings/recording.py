@@ -46,16 +46,10 @@ class Choice:
 class Recording:
     """Signals of N nodes at T times.
 
-    Attributes
-    ----------
-    t : shape (T,), or None
-        Times; seconds where the file has dates. None where the file has none.
-    u : shape (T, N)
-        NaN where a value is missing.
-    names : tuple of str
-        Names of the nodes, their numbers from 0 where the file has none.
-    notes : tuple of str
-        What was taken for what, a line each.
+    t (T,): times; seconds where the file has dates. None where the file has none.
+    u (T, N): NaN where a value is missing.
+    names: names of the nodes, their numbers from 0 where the file has none.
+    notes: what was taken for what, a line each.
     """
 
     t: Array | None

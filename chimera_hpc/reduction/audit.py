@@ -136,29 +136,17 @@ def audit_sweep(
 
     The store is read only. Killed at any moment, results.json is whole, old or new.
 
-    Parameters
-    ----------
-    folder : path
-        A sweep's folder, the one that holds store.zarr.
-    sample : Sample
-    workers : int
-        Worker processes on this machine; below 2 this process computes. The result is the same.
-    ways : sequence of str
-        Of `audit_runs.WAYS`.
-    on_piece : callable
-        Called with the numbers of runs done and in all, as they are done.
+    folder: a sweep's folder, the one that holds store.zarr.
+    workers: worker processes on this machine; below 2 this process computes. The result is the
+        same.
+    ways: of `audit_runs.WAYS`.
+    on_piece: called with the numbers of runs done and in all, as they are done.
 
-    Returns
-    -------
-    dict
-        As in results.json; docs/audit.md has the keys.
+    Returns what results.json holds; docs/audit.md has the keys.
 
-    Raises
-    ------
-    BadInput
-        No store, not reduced since its last points were computed, or no point with a result.
-    DamagedChunk
-        A chunk of results that the ledger vouches for is missing or damaged.
+    Raises BadInput: no store, not reduced since its last points were computed, or no point with a
+    result.
+    Raises DamagedChunk: A chunk of results that the ledger vouches for is missing or damaged.
     """
     folder = Path(folder)
     before = read_results(folder / _RESULTS)

@@ -91,19 +91,11 @@ def compute_again(
 
     What comes out does not depend on the number of workers.
 
-    Parameters
-    ----------
-    chosen : (m,)
-        Points by their numbers.
-    workers : int
-        Worker processes on this machine; below 2 this process computes.
-    on_piece : callable
-        Called with the number of runs of each piece that has been done.
+    chosen (m,): points by their numbers.
+    workers: worker processes on this machine; below 2 this process computes.
+    on_piece: called with the number of runs of each piece that has been done.
 
-    Raises
-    ------
-    BadInput
-        A point cannot be computed, as when a user's model is not what it was.
+    Raises BadInput: A point cannot be computed, as when a user's model is not what it was.
     """
     pieces = np.array_split(chosen, max(1, -(-len(chosen) // _PIECE)))
     # The longest ones first, so that no worker is left with one at the end.

@@ -1,4 +1,4 @@
-"""Points of a sweep computed anew, with the same kernels, to be looked at."""
+"""Points of a sweep computed again, with the same kernels, to be looked at."""
 
 from __future__ import annotations
 
@@ -26,26 +26,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """One point computed anew.
+    """One point computed again.
 
-    Attributes
-    ----------
-    point : int
-        Its number in the store.
-    title : str
-        Parameters that vary, seed and class.
-    t, u, w : shape (T,), (T, N), (T, N)
-        The two signals on the analysis interval, u as it is stored, NaN where the run did not get.
-    status : Status
-    features : shape (8, N)
-        NaN unless the status is DONE.
-    triplet : shape (3,)
-        V_theta, V_a, V_Omega.
-    n_windows : int
-    digest, stored : int, int or None
-        Digest of what came out now, and of what the store holds, None where the point never ran.
-    class_name : str or None
-        Class by the last reduction; None without one.
+    point: its number in the store.
+    title: parameters that vary, seed and class.
+    t, u, w (T,), (T, N), (T, N): the two signals on the analysis interval, u as it is stored, NaN
+        after the end of a run that failed.
+    features (8, N): NaN unless the status is DONE.
+    triplet (3,): V_theta, V_a, V_Omega.
+    digest, stored: digest of what came out now, and of what the store holds, None where the point
+        never ran.
+    class_name: class by the last reduction; None without one.
     """
 
     point: int
@@ -149,18 +140,9 @@ def window_spectrum(
 ) -> tuple[Spectrum, str]:
     """Return what the Fourier method saw of one node in one window, and a line that says it.
 
-    Parameters
-    ----------
-    t, u : shape (T,), (T, N)
-    settings : Features
-        How the sweep measures.
-    node, window : int
-        Both from 0.
+    t (T,), u (T, N); settings: how the sweep measures; node, window: both from 0.
 
-    Raises
-    ------
-    BadInput
-        There is no such node or window.
+    Raises BadInput: there is no such node or window.
     """
     if not 0 <= node < u.shape[1]:
         raise BadInput(f"--node {node}: allowed is 0 to {u.shape[1] - 1}")

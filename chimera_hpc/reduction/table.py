@@ -23,13 +23,9 @@ _NOTHING = "."
 def class_table(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
     """Return the modal classes as text.
 
-    Parameters
-    ----------
-    cuts : mapping of str to cells
-        For each cut its cells with ``class`` and ``votes``, in one order (as in results.json). The
-        first cut is the one that maps and counts show.
-    axes : sequence of FreeAxis
-        What varies between cells.
+    cuts: for each cut its cells with ``class`` and ``votes``, in one order (as in results.json).
+        The first cut is the one that maps and counts show.
+    axes: what varies between cells.
     """
     if not cuts:
         return ""

@@ -64,12 +64,8 @@ class Content:
         The tree is that of the last reduction where that is in step with the ledger; otherwise it
         is grown anew, over at most `largest_tree` points (`classify`'s own limit by default).
 
-        Raises
-        ------
-        BadInput
-            No store in the folder.
-        DamagedChunk
-            A chunk of results that the ledger vouches for is missing or damaged.
+        Raises BadInput: no store in the folder.
+        Raises DamagedChunk: A chunk of results that the ledger vouches for is missing or damaged.
         """
         store = Store.open(folder / STORE_NAME)
         scan, scalars = store.scan(), store.scalars()

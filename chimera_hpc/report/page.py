@@ -62,23 +62,15 @@ def write_report(
 ) -> Report:
     """Write ``report.html`` into a sweep's folder, finished or not; replaces the one before.
 
-    Parameters
-    ----------
-    folder : path
-        The folder that holds store.zarr.
-    most_pictures : int
-        Cells that carry a picture and profiles at most.
-    replay : bool
-        Whether runs whose series the store does not keep may be computed anew for their pictures.
-    largest_tree : int, optional
-        Points in the tree, where the last reduction's is out of date (see `Content.read`).
+    folder: the folder that holds store.zarr.
+    most_pictures: cells that carry a picture and profiles at most.
+    replay: whether runs whose series the store does not keep may be computed anew for their
+        pictures.
+    largest_tree: points in the tree, where the last reduction's is out of date (see
+        `Content.read`).
 
-    Raises
-    ------
-    BadInput
-        No store in the folder.
-    DamagedChunk
-        A chunk of results that the ledger vouches for is missing or damaged.
+    Raises BadInput: no store in the folder.
+    Raises DamagedChunk: A chunk of results that the ledger vouches for is missing or damaged.
     """
     content = Content.read(Path(folder), largest_tree)
     data = page(content, most_pictures, replay).encode()

@@ -47,22 +47,15 @@ def run_block(
     A run that becomes non-finite, or whose steps become too small, is tried again with both
     tolerances multiplied by ``run.tighten``, up to ``run.attempts`` tries in all.
 
-    Parameters
-    ----------
-    sweep : Sweep
-    points : Points
-        Any points of the sweep.
-    should_stop : callable, optional
-        Asked about ten times a second; when true, the result is returned as far as it has come.
-    on_point : callable, optional
-        Called with (index, status) as each point ends.
-    on_signals : callable, optional
-        Called with (index, u, w) as each point ends; both signals are (N, T), NaN where the run did
-        not get to, as they were before u was rounded. They are buffers: copy what is to be kept.
-    lanes : int, optional
-        Lanes of the stepping loop; chosen from the work by default.
-    nudge : float
-        How far initial states are moved (see `initial_state`); 0 for a sweep's own points.
+    points: any points of the sweep.
+    should_stop: asked about ten times a second; when true, the result is returned as far as it has
+        come.
+    on_point: called with (index, status) as each point ends.
+    on_signals: called with (index, u, w) as each point ends; both signals are (N, T), NaN where the
+        run did not get to, as they were before u was rounded. They are buffers: copy what is to be
+        kept.
+    lanes: lanes of the stepping loop; chosen from the work by default.
+    nudge: how far initial states are moved (see `initial_state`); 0 for a sweep's own points.
     """
     block = _Block(sweep, points, on_signals, nudge)
     with suppress(Stopped):
@@ -88,11 +81,7 @@ def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
     move to the other one, and its window with it, when the features are computed anew from the
     store. Values beyond the range of int16, which the store does not keep, are rounded alike.
 
-    Parameters
-    ----------
-    u, back : shape (N, T)
-    stored : shape (T, N)
-        In the type of the store.
+    stored (T, N): in the type of the store.
     """
     if stored.dtype != np.int16:
         stored[:] = u.T

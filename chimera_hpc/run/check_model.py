@@ -24,10 +24,7 @@ Array = NDArray[np.float64]
 def check_user_model(sweep: Sweep, row: Row) -> None:
     """Build a user's model for one point and try all that `Model` lists.
 
-    Raises
-    ------
-    BadInput
-        With what is missing, or of the wrong kind or shape.
+    Raises BadInput with what is missing, or of the wrong kind or shape.
     """
     where = f"model: {short(sweep.model)}"
     try:

@@ -51,18 +51,11 @@ class ExecutorChoice:
     ) -> Iterator[Cluster]:
         """Start or join the chosen cluster.
 
-        Parameters
-        ----------
-        store : Path
-            What the workers work on.
-        n_blocks : int
-            Blocks to be computed; SLURM is asked for no more workers than that.
-        say : callable
-            Takes lines for people.
-        patience : float
-            Seconds after which a worker that gives no sign of life is given up.
-        meanwhile : callable, optional
-            What to do in a thread while local workers start.
+        store: what the workers work on.
+        n_blocks: blocks to be computed; SLURM is asked for no more workers than that.
+        say: takes lines for people.
+        patience: seconds after which a worker that gives no sign of life is given up.
+        meanwhile: what to do in a thread while local workers start.
         """
         if self.kind == "slurm" and self.slurm_options is not None:
             from chimera_hpc.run.slurm.workers import slurm_cluster

@@ -39,12 +39,8 @@ for lanes in (1, LANES):
 def compile_once(sweep: Sweep, points: Points, *, load: bool) -> None:
     """Compile the kernels that the sweep's points need, unless they are known to be on the disk.
 
-    Parameters
-    ----------
-    sweep, points
-        As in `block.warm_up`.
-    load : bool
-        Whether this process needs the kernels itself.
+    sweep, points: as in `block.warm_up`.
+    load: whether this process needs the kernels itself.
     """
     spec = sweep.to_dict()
     known = is_compiled(spec)

@@ -266,10 +266,7 @@ class Driver:
 def changes(store: Store, info: dict[str, Any], strict: bool) -> list[str]:
     """Return a line for each thing that may change numbers since the results in a store were made.
 
-    Raises
-    ------
-    BadInput
-        When there is any, and `strict` forbids it.
+    Raises BadInput when there is any, and `strict` forbids it.
     """
     from chimera_hpc.store.runs import read_run
 

@@ -68,24 +68,14 @@ def run_dask(
     Workers write their blocks themselves and send back receipts. A task whose worker died is
     submitted again: the claims in the store count the losses, so the culprit is found.
 
-    Parameters
-    ----------
-    client : Client
-    message, blocks, on_receipt
-        As in `run_serial`.
-    should_stop : callable
-        Asked twice a second. When true, the workers are told through the message's stop file, and
-        what they have done so far is waited for.
-    patience : float
-        Seconds of waiting for workers that were told to stop.
-    may_come : callable
-        Whether workers that are not there yet may still come, as from the queue of a batch system:
-        then they are waited for.
+    message, blocks, on_receipt: as in `run_serial`.
+    should_stop: asked twice a second. When true, the workers are told through the message's stop
+        file, and what they have done so far is waited for.
+    patience: seconds of waiting for workers that were told to stop.
+    may_come: whether workers that are not there yet may still come, as from the queue of a batch
+        system: then they are waited for.
 
-    Raises
-    ------
-    ClusterLost
-        When the scheduler went away, or there was no worker for `NO_WORKER_SECONDS`.
+    Raises ClusterLost when the scheduler went away, or there was no worker for `NO_WORKER_SECONDS`.
     """
     _Window(client, message, blocks, patience, may_come).run(on_receipt, should_stop)
 

@@ -22,10 +22,7 @@ def initial_state(sweep: Sweep, row: Row, model: Model, nudge: float = 0.0) -> t
     may draw it otherwise, from the same stream. `nudge` then moves every variable x by
     ``nudge * max(1, |x|) * U[-1, 1]``, drawn from that stream, too.
 
-    Returns
-    -------
-    u : shape (N0,)
-    v : shape (n_second,)
+    Returns u (N0,) and v (n_second,).
     """
     stream = initial_stream(*stream_key(sweep.model, sweep.n_nodes, row))
     drawn = model.draw(stream) if isinstance(model, OwnPoint) else None

@@ -74,18 +74,12 @@ def local_cluster(
     Scheduler and workers listen on the loopback interface only. They show no dashboards: loading
     Bokeh would take each of these processes a second, and `status` and `watch` read the store.
 
-    Parameters
-    ----------
-    workers : int
-        Number of worker processes; 0 means one a core.
-    patience : float
-        Seconds after which a worker that gives no sign of life is replaced.
-    scratch : Path, optional
-        Folder for the workers' own files; a temporary one by default.
-    memory_limit : str, optional
-        Memory at which a worker is ended and replaced; a share of the machine's by default.
-    meanwhile : callable, optional
-        What to do in a thread while the workers start: this process only waits for them.
+    workers: number of worker processes; 0 means one a core.
+    patience: seconds after which a worker that gives no sign of life is replaced.
+    scratch: folder for the workers' own files; a temporary one by default.
+    memory_limit: memory at which a worker is ended and replaced; a share of the machine's by
+        default.
+    meanwhile: what to do in a thread while the workers start: this process only waits for them.
     """
     import dask
     from distributed import Client, Nanny, SpecCluster
@@ -129,10 +123,7 @@ def local_cluster(
 def existing_cluster(scheduler_file: Path, *, patience: float = 60.0) -> Iterator[Client]:
     """Connect to a scheduler that is running already, or will be, by the file it writes.
 
-    Raises
-    ------
-    BadInput
-        When no scheduler answers within ``patience`` seconds.
+    Raises BadInput when no scheduler answers within ``patience`` seconds.
     """
     import dask
 

@@ -62,12 +62,7 @@ def do_block(
 ) -> BlockReceipt:
     """Claim a block, compute what is to do in it, write it.
 
-    Parameters
-    ----------
-    message : RunMessage
-    block : int
-    local_stop : callable, optional
-        A second reason to stop, beside the run's stop file.
+    local_stop: a second reason to stop, next to the run's stop file.
     """
     stop = StopSignal(message.stop_file, local_stop)
     if stop():

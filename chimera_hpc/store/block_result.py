@@ -21,18 +21,13 @@ class BlockResult:
 
     A point that was not reached (the caller stopped) has status NEVER and is not written.
 
-    Attributes
-    ----------
-    status : shape (n,)
-        `Status` of each point.
-    features : shape (n, 8, N0)
-        Along axis 1 `schema.FEATURES`; NaN unless the point is DONE.
-    scalars : shape (n, n_scalars)
-        Along axis 1 `schema.scalar_labels`; like the features, of u as it is stored (`rounded`).
-    steps, elapsed_us, n_windows : shape (n,)
-        Accepted steps, share of the wall time in microseconds, Fourier windows.
-    series : shape (n, T, N0) or None
-        u on the analysis interval as it is stored; None when the sweep keeps none.
+    status (n,): `Status` of each point.
+    features (n, 8, N0): along axis 1 `schema.FEATURES`; NaN unless the point is DONE.
+    scalars (n, n_scalars): along axis 1 `schema.scalar_labels`; like the features, of u as it is
+        stored (`rounded`).
+    steps, elapsed_us, n_windows (n,): accepted steps, share of the wall time in microseconds,
+        Fourier windows.
+    series (n, T, N0): u on the analysis interval as it is stored; None when the sweep keeps none.
     """
 
     status: NDArray[np.int64]

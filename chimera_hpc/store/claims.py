@@ -121,15 +121,11 @@ def claim_block(
     expiry: float = EXPIRY,
     note: Mapping[str, Any] | None = None,
 ) -> Claim | None:
-    """Claim a block of a store, or return None where somebody else holds it.
+    """Claim a block of a store, or return None where another runner holds it.
 
-    Parameters
-    ----------
-    store : path of the Zarr store
-    block : number of the block, or a word for something else that only one may do at a time
-    run : number of the run, as in the ledger
-    expiry : seconds without `Claim.refresh` after which others may take over
-    note : what the next owner should know if this one dies, such as the first point to be done
+    block: its number, or a word for something else that only one may do at a time.
+    expiry: seconds without `Claim.refresh` after which others may take over.
+    note: what the next owner should know if this one dies, such as the first point to be done.
 
     After a successful claim, look again at what is left to do: the block may have been finished
     between the look at the ledger and the claim.

@@ -186,13 +186,8 @@ def canonical(values: ArrayLike) -> NDArray[np.float64]:
 def digests(features: ArrayLike, scalars: ArrayLike) -> NDArray[np.int64]:
     """Return the signed 64-bit BLAKE2b digest of each point's results.
 
-    Parameters
-    ----------
-    features : (points, features, nodes)
-    scalars : (points, quantities)
-
-    The digest runs over the stored bytes (`canonical`) of the point's features, then of its
-    scalars; times and attempts do not enter.
+    features: (points, features, nodes)
+    scalars: (points, quantities)
     """
     return stored_digests(canonical(features), canonical(scalars))
 

@@ -48,12 +48,9 @@ def merge(path: Path, stores: Sequence[Store]) -> Merged:
     A point that is in several stores is taken from the first one that has a result for it, else
     from the first that tried it. Runs are numbered anew, store after store.
 
-    Raises
-    ------
-    BadInput
-        When the path exists or cannot be written, or the sweeps differ in more than their axes.
-    DamagedChunk
-        When a chunk of one of the stores is.
+    Raises BadInput when the path exists or cannot be written, or the sweeps differ in more than
+    their axes.
+    Raises DamagedChunk when a chunk of one of the stores is.
     """
     for other in stores[1:]:
         _check_alike(stores[0], other)

@@ -253,14 +253,10 @@ class Store:
     ) -> Receipt:
         """Write a block, or only some of its points, and return the receipt.
 
-        Parameters
-        ----------
-        i : block
-        result : results of the points in `rows`, in their order; those with status 255 did not run
-        run : number from `start_run`
-        attempts : tries of these points since the block was last written, added to the ledger's
-        claim : the right to write the block; ClaimLost is raised when somebody else has it by now
-        rows : points counted within the block; all of them when not given
+        result: results of the points in `rows`, in their order; status 255 means not run.
+        attempts: tries of these points since the block was last written, added to the ledger's.
+        claim: the right to write the block; ClaimLost is raised when another owner has it by now.
+        rows: points counted within the block; all of them when not given.
         """
         start, stop = self.block(i)
         where = range(stop - start) if rows is None else rows

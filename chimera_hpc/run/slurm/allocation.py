@@ -31,10 +31,7 @@ def allocation_cluster(
 ) -> Iterator[Client]:
     """Start a scheduler here and a worker for each task of this job; give a client of it.
 
-    Raises
-    ------
-    BadInput
-        Outside of a SLURM job.
+    Raises BadInput outside of a SLURM job.
     """
     if "SLURM_JOB_ID" not in os.environ:
         raise BadInput("--cluster allocation: works inside a SLURM job only; see the command slurm")

@@ -27,10 +27,7 @@ def user_file() -> Path:
 def slurm_options(table: Slurm, given: Mapping[str, Any]) -> Slurm:
     """Return what is asked of SLURM: the user's file, overridden by the job and the command line.
 
-    Raises
-    ------
-    BadInput
-        For a key that is none, or a value, naming the place.
+    Raises BadInput for a key that is none, or a value, naming the place.
     """
     base = _users_own()
     told = {name: given[name] for name in NAMES if given.get(name) is not None}

@@ -51,12 +51,8 @@ class SlurmFailed(RuntimeError):
 def ask(*command: str, text: str | None = None, tries: int = TRIES) -> str:
     """Run a command of SLURM and return what it printed.
 
-    Raises
-    ------
-    BadInput
-        When the command is not there.
-    SlurmFailed
-        When it refused, or the controller did not answer `tries` times.
+    Raises BadInput when the command is not there.
+    Raises SlurmFailed when it refused, or the controller did not answer `tries` times.
     """
     return _ask(command, text, tries, lambda: None)
 
@@ -123,10 +119,7 @@ def one_line(text: str) -> str:
 def check(script: str, *options: str) -> None:
     """Ask SLURM whether it would take a batch script.
 
-    Raises
-    ------
-    BadInput
-        With SLURM's reason, when it refuses or does not answer.
+    Raises BadInput with SLURM's reason, when it refuses or does not answer.
     """
     try:
         ask("sbatch", "--test-only", *options, text=script)

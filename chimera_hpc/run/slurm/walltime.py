@@ -78,12 +78,7 @@ class Hours:
 class CostModel:
     """Predicts the work of points from that of the points nearby that have been done.
 
-    Parameters
-    ----------
-    sweep : Sweep
-    points : Points
-    status, elapsed_us : shape (n_points,)
-        As in the ledger.
+    status, elapsed_us (n_points,): as in the ledger.
     """
 
     def __init__(self, sweep: Sweep, points: Points, status: Rows, elapsed_us: Rows) -> None:

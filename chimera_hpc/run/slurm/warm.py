@@ -14,10 +14,7 @@ _STORE = "store.zarr"
 def main(path: Path) -> None:
     """Compile the kernels of a sweep's points, unless the node has them.
 
-    Parameters
-    ----------
-    path : Path
-        A job file, a sweep's folder or its store.
+    path: a job file, a sweep's folder or its store.
     """
     store = path if (path / METADATA).is_file() else path / _STORE
     # The other processes of the node wait meanwhile: a store is opened only to compile.

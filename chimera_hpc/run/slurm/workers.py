@@ -141,10 +141,7 @@ class Keeper(threading.Thread):
 def check_options(slurm_options: Slurm, store: Path) -> None:
     """Ask, before anything is begun, whether SLURM would take the job of a worker.
 
-    Raises
-    ------
-    BadInput
-        When it would not, or what is needed here is not there.
+    Raises BadInput when it would not, or what is needed here is not there.
     """
     check_interface(slurm_options)
     queue.check(worker_request(store, slurm_options))
@@ -169,22 +166,12 @@ def slurm_cluster(
 
     Traffic is under TLS with a certificate of this run alone; the dashboard listens on loopback.
 
-    Parameters
-    ----------
-    slurm_options : Slurm
-    store : Path
-        What the workers work on: names of jobs and the folder of logs follow from it.
-    blocks : int
-        Blocks to be done; more workers are not asked for.
-    say : callable
-        Takes lines for people.
-    patience : float
-        Seconds after which a worker that gives no sign of life is given up.
+    store: what the workers work on: names of jobs and the folder of logs follow from it.
+    blocks: blocks to be done; more workers are not asked for.
+    say: takes lines for people.
+    patience: seconds after which a worker that gives no sign of life is given up.
 
-    Raises
-    ------
-    BadInput
-        When SLURM would refuse the workers' jobs.
+    Raises BadInput when SLURM would refuse the workers' jobs.
     """
     import dask
     from distributed import Client
