@@ -1,0 +1,131 @@
+"""How often a claim holds when the seeds are drawn again: a bootstrap of whole sweeps.
+
+The runs of every cell are drawn with replacement, as many as there are (Efron 1979,
+doi:10.1214/aos/1176344552), and everything that follows from them is made again: the tree, the
+atlases, the analyses, the judgement of the claim. No run is computed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.classification import Classification, classify
+from chimera_hpc.job import Points, Sweep
+from chimera_hpc.reduction.analyses import analyse
+from chimera_hpc.reduction.analysis_input import AnalysisInput
+from chimera_hpc.reduction.results import TRIPLET, build_results
+from chimera_hpc.store.labelled import STORE_NAME
+from chimera_hpc.store.store import Store
+from scoreboard.claims import PaperClaim
+from scoreboard.evidence import Evidence, Missing
+from scoreboard.rules import NOT_DECIDABLE, REPRODUCED
+
+DRAWS = 200
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What a job's store holds of its n runs."""
+
+    sweep: Sweep
+    points: Points
+    status: NDArray[np.int64]
+    scalars: Mapping[str, NDArray[np.float64]]
+
+    @classmethod
+    def read(cls, folder: Path) -> Runs:
+        """Read them; Missing without a store or with points pending."""
+        if not (folder / STORE_NAME).is_dir():
+            raise Missing(f"the job {folder.name} has not been run")
+        store = Store.open(folder / STORE_NAME)
+        return cls(store.sweep, store.points, store.ledger()["status"], store.scalars())
+
+    @cached_property
+    def cells(self) -> list[NDArray[np.int64]]:
+        """The points of each cell."""
+        cell = self.points.cells()[0]
+        order = np.argsort(cell, kind="stable")
+        return np.split(order, np.flatnonzero(np.diff(cell[order])) + 1)
+
+    def drawn(self, rng: np.random.Generator) -> Runs:
+        """Return as many runs, those of each cell drawn from it with replacement."""
+        picked = np.empty(len(self.status), dtype=np.int64)
+        for cell in self.cells:
+            picked[cell] = rng.choice(cell, len(cell))
+        scalars = {name: values[picked] for name, values in self.scalars.items()}
+        return Runs(self.sweep, self.points, self.status[picked], scalars)
+
+
+class RedrawnEvidence(Evidence):
+    """What the jobs would have found with other seeds: one draw of all of them."""
+
+    def __init__(self, folder: str | Path, runs: dict[str, Runs], draw: int) -> None:
+        super().__init__(folder)
+        self._runs, self._draw = runs, draw
+        self._classes: dict[str, Classification] = {}
+
+    def job(self, name: str) -> dict[str, Any]:
+        """Return what results.json would hold."""
+        if name not in self._known:
+            runs, classes = self._redrawn(name)
+            self._known[name] = self._results(runs, classes)
+        return self._known[name]
+
+    def _redrawn(self, name: str) -> tuple[Runs, Classification]:
+        if name not in self._runs:
+            self._runs[name] = Runs.read(self.folder / name)
+        # The same draw of an atlas, whichever job asks for it.
+        key = [self._draw, *name.encode()]
+        runs = self._runs[name].drawn(np.random.default_rng(key))
+        if name not in self._classes:
+            spec = runs.sweep.reduction
+            self._classes[name] = classify(
+                np.stack([runs.scalars[each] for each in TRIPLET], axis=1),
+                runs.status,
+                linkage=spec.linkage,
+                cuts=spec.cuts,
+                depth=spec.depth,
+                names=spec.names,
+            )
+        return runs, self._classes[name]
+
+    def _results(self, runs: Runs, classes: Classification) -> dict[str, Any]:
+        spec = runs.sweep.reduction
+        given = AnalysisInput(
+            sweep=runs.sweep,
+            points=runs.points,
+            status=runs.status,
+            scalars=runs.scalars,
+            classification=classes,
+            cut=next(iter(classes.cuts.values())),
+            atlases={name: Atlas.of(self._redrawn(name)[1]) for name in spec.atlas},
+        )
+        curves = analyse(given, lambda line: None)
+        return build_results(runs.sweep, runs.points, {"status": runs.status}, classes, curves)
+
+
+def chances(
+    claims: Sequence[PaperClaim], folder: str | Path, draws: int = DRAWS
+) -> dict[str, dict[str, int]]:
+    """Return by the claim's id in how many of how many draws it holds.
+
+    Draws in which a claim can't be decided are not counted; a claim that is decided in none is
+    left out.
+    """
+    runs: dict[str, Runs] = {}
+    found = {claim.id: {"holds": 0, "of": 0} for claim in claims}
+    for draw in range(draws):
+        evidence = RedrawnEvidence(folder, runs, draw)
+        for claim in claims:
+            outcome = claim.judge(evidence)
+            found[claim.id]["of"] += outcome.outcome != NOT_DECIDABLE
+            found[claim.id]["holds"] += outcome.outcome == REPRODUCED
+    return {name: count for name, count in found.items() if count["of"]}
