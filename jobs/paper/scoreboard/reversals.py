@@ -12,9 +12,10 @@ dw/dt = b s + c w + L0 u. So if W depends on the orientation through the size of
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -80,7 +81,7 @@ class Norms:
         done = store.ledger()["status"] == Status.DONE
         triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
         named = np.array(load_atlas(folder / judge).classify(triplets).name)
-        rings = (build(store.sweep, store.points.row(i)) for i in range(len(done)))
+        rings: Iterator[Any] = (build(store.sweep, store.points.row(i)) for i in range(len(done)))
         norm = np.array([float((ring.topology.divergence**2).sum()) for ring in rings])
         return cls(norm, done & (named == "chimera"))
 
