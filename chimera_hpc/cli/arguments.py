@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import short
@@ -26,56 +26,87 @@ STORE = "store.zarr"
 _SIZE = re.compile(r"[1-9][0-9]{0,9}([kMGT]i?)?B", re.ASCII)
 
 
-def add_job(parser: ArgumentParser) -> None:
-    """Add the job file and what overrides it."""
-    parser.add_argument(
-        "job",
-        type=job_file,
-        metavar="JOB.toml",
-        help="the job file; quickstart, paper/plane and others come with the package",
-    )
-    add_overrides(parser)
+def folder_name(text: str) -> Path:
+    """Return the folder that an option names."""
+    if not text.strip():
+        raise ArgumentTypeError("empty; the name of a folder is needed")
+    return Path(text)
 
 
-def add_overrides(parser: ArgumentParser) -> None:
-    """Add what overrides keys of a job."""
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="override a key of the job, e.g. P=3:8, seeds=4, features.start=900; may be repeated",
-    )
+def flag(text: str) -> dict[str, Any]:
+    """Return an option without a value, as `ArgumentParser.add_argument` takes it."""
+    return {"action": "store_true", "help": text}
 
 
-def add_block(parser: ArgumentParser) -> None:
-    """Add the size of a block."""
-    parser.add_argument(
-        "--block", type=int, metavar="N", help="points a block (default: chosen from the cost)"
-    )
+def value(metavar: str, kind: Callable[[str], Any], text: str, **more: Any) -> dict[str, Any]:
+    """Return an argument with a value, as `ArgumentParser.add_argument` takes it."""
+    return {"metavar": metavar, "type": kind, "help": text, **more}
 
 
-def add_out(parser: ArgumentParser) -> None:
-    """Add the folder of a sweep that may not exist yet."""
-    parser.add_argument(
-        "--out", type=folder_name, metavar="DIR", help="the sweep's folder (default: results/NAME)"
-    )
+_SET = "override a key of the job, e.g. P=3:8, seeds=4, features.start=900; may be repeated"
+_CLUSTER = (
+    "serial: this process; local: worker processes here (default); scheduler-file: a Dask cluster "
+    "that is running already; slurm: worker jobs that this process submits; allocation: the tasks "
+    "of the SLURM job that this process is in"
+)
+_RESUBMIT = "go on up to N times, as the same SLURM job, when its time limit stopped it"
+_STRICT = "refuse to go on with other code, libraries or processors than the results there have"
+_JOB = "the job file; quickstart, paper/plane and others come with the package"
+_MEMORY = "memory at which a local worker is ended, e.g. 2GB (default: a fair share)"
+_SHARED = {
+    "job": value("JOB.toml", job_file, _JOB),
+    "folder": value("DIR", Path, "the sweep's folder"),
+    "point": value("NAME=VALUE", str, "such as P=3 Q=5 seed=7", nargs="+"),
+    "--set": value("KEY=VALUE", str, _SET, dest="overrides", action="append", default=[]),
+    "--out": value("DIR", folder_name, "the sweep's folder (default: results/NAME)"),
+    "--block": value("N", int, "points per block (default: chosen from the cost)"),
+    "--yes": flag("accept a plan of absurd size"),
+    "--json": flag("print one JSON object"),
+    "--cluster": {"default": "local", "choices": CLUSTERS, "help": _CLUSTER},
+    "--scheduler-file": value("FILE", Path, "file that its scheduler wrote"),
+    "--workers": value("N", int, "worker processes (default: one per core)"),
+    "--memory": value("SIZE", str, _MEMORY),
+    "--resubmit": value("N", int, _RESUBMIT, default=0),
+    "--no-figures": flag("results.json, but no figures and no report"),
+    "--strict": flag(_STRICT),
+}
+_SLURM = {
+    "--partition": value("NAME", str, "partition of the jobs"),
+    "--account": value("NAME", str, "account that they are charged to"),
+    "--time": value("LIMIT", str, "time limit of a job, e.g. 30 or 1-12:00:00"),
+    "--mem": value("SIZE", str, "memory of a worker, e.g. 800M or 2G"),
+    "--interface": value("NAME", str, "network of scheduler and workers"),
+}
+EXECUTOR = ("--cluster", "--scheduler-file", "--workers", "--memory")
+"""Arguments for where the work is done."""
 
 
-def add_yes(parser: ArgumentParser) -> None:
-    """Add the consent to an absurd plan."""
-    parser.add_argument("--yes", action="store_true", help="accept a plan of absurd size")
+def add(parser: ArgumentParser, *shared: str, **own: dict[str, Any]) -> None:
+    """Add arguments that several commands share, by name, then options of the command's own.
+
+    ``no_map=flag(...)`` declares ``--no-map``.
+    """
+    arguments = {name: _SHARED[name] for name in shared}
+    for name, options in (arguments | _options(own)).items():
+        parser.add_argument(name, **options)
 
 
-def add_folder(parser: ArgumentParser) -> None:
-    """Add the folder of a sweep that exists."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="the sweep's folder")
+def add_group(parser: ArgumentParser, title: str, **own: dict[str, Any]) -> None:
+    """Add a group of options, as `add` does."""
+    group = parser.add_argument_group(title)
+    for name, options in _options(own).items():
+        group.add_argument(name, **options)
 
 
-def add_point(parser: ArgumentParser) -> None:
-    """Add the selection of points by their values."""
-    parser.add_argument("point", nargs="+", metavar="NAME=VALUE", help="such as P=3 Q=5 seed=7")
+def _options(own: Mapping[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {f"--{name.replace('_', '-')}": options for name, options in own.items()}
+
+
+def add_slurm(parser: ArgumentParser) -> None:
+    """Add the options for SLURM."""
+    group = parser.add_argument_group("SLURM", "override the table [slurm] of the job")
+    for name, options in _SLURM.items():
+        group.add_argument(name, **options)
 
 
 def find_points(store: Store, words: Sequence[str]) -> list[int]:
@@ -92,62 +123,6 @@ def find_points(store: Store, words: Sequence[str]) -> list[int]:
     if not len(found):
         raise BadInput(f"point: {short(text)}: there is no such point in {store.path}")
     return [int(i) for i in found]
-
-
-def add_executor(parser: ArgumentParser) -> None:
-    """Add where the work is done."""
-    parser.add_argument(
-        "--cluster",
-        default="local",
-        choices=CLUSTERS,
-        help="serial: this process; local: worker processes here (default); "
-        "scheduler-file: a Dask cluster that is running already; slurm: worker jobs that this "
-        "process submits; allocation: the tasks of the SLURM job that this process is in",
-    )
-    parser.add_argument(
-        "--scheduler-file", type=Path, metavar="FILE", help="file that its scheduler wrote"
-    )
-    parser.add_argument(
-        "--workers", type=int, metavar="N", help="worker processes (default: one a core)"
-    )
-    parser.add_argument(
-        "--memory",
-        metavar="SIZE",
-        help="memory at which a local worker is ended, e.g. 2GB (default: a fair share)",
-    )
-
-
-def add_slurm(parser: ArgumentParser) -> None:
-    """Add what is asked of SLURM; each overrides the job's table [slurm]."""
-    group = parser.add_argument_group("SLURM", "override the table [slurm] of the job")
-    group.add_argument("--partition", metavar="NAME", help="partition of the jobs")
-    group.add_argument("--account", metavar="NAME", help="account that they are charged to")
-    group.add_argument("--time", metavar="LIMIT", help="time limit of a job, e.g. 30 or 1-12:00:00")
-    group.add_argument("--mem", metavar="SIZE", help="memory of a worker, e.g. 800M or 2G")
-    group.add_argument("--interface", metavar="NAME", help="network of scheduler and workers")
-
-
-def add_resubmit(parser: ArgumentParser) -> None:
-    """Add going on after the time limit."""
-    parser.add_argument(
-        "--resubmit",
-        type=int,
-        default=0,
-        metavar="N",
-        help="go on up to N times, as the same SLURM job, when its time limit stopped it",
-    )
-
-
-def add_reduction(parser: ArgumentParser) -> None:
-    """Add how a run ends, and whether it may begin."""
-    parser.add_argument(
-        "--no-figures", action="store_true", help="results.json, but no figures and no report"
-    )
-    parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="refuse to go on with other code, libraries or processors than the results there have",
-    )
 
 
 def executor_of(args: Namespace, sweep: Sweep, store: Path) -> ExecutorChoice:
@@ -205,13 +180,6 @@ def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> S
 
         check_selections(sweep, sweep.points())
     return sweep
-
-
-def folder_name(text: str) -> Path:
-    """Return the folder that an option names."""
-    if not text.strip():
-        raise ArgumentTypeError("empty; the name of a folder is needed")
-    return Path(text)
 
 
 def sweep_folder(out: Path | None, sweep: Sweep) -> Path:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.processes import usable_cores
-from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.arguments import add, flag, store_path, value
 
 if TYPE_CHECKING:
     from chimera_hpc.reduction.audit import Sample
@@ -32,20 +32,15 @@ _SHARE = 0.05
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument(
-        "--share",
-        type=float,
-        metavar="X",
-        help=f"share of the points to compute again, 0 to 1 (default: {_SHARE})",
+    add(
+        parser,
+        *("folder", "--json"),
+        share=value("X", float, f"share of points to compute again, 0 to 1 (default: {_SHARE})"),
+        points=value("N", int, "number of points instead"),
+        seed=value("K", int, "chooses the sample", default=0),
+        workers=value("N", int, "processes here (default: one per core; 1: this one)"),
+        no_figures=flag("results.json only"),
     )
-    parser.add_argument("--points", type=int, metavar="N", help="number of points instead")
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="chooses the sample")
-    parser.add_argument(
-        "--workers", type=int, metavar="N", help="processes here (default: one a core; 1: this one)"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--no-figures", action="store_true", help="results.json only")
 
 
 def execute(args: Namespace) -> int:

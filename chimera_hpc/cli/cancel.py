@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.arguments import add, store_path
 from chimera_hpc.run.slurm import queue, tls
 from chimera_hpc.run.slurm.queue import SlurmFailed
 from chimera_hpc.run.slurm.script import job_name
@@ -21,7 +21,7 @@ What they have done stays, and `run` or another job goes on from there.
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
+    add(parser, "folder")
 
 
 def execute(args: Namespace) -> int:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import folder_name
+from chimera_hpc.cli.arguments import add, add_group, flag, folder_name, value
 
 if TYPE_CHECKING:
     from chimera_hpc.job.tables import Features
@@ -36,61 +36,40 @@ of pickled objects are refused.
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the recording")
-    parser.add_argument("--atlas", type=Path, metavar="STORE", help="a reduced sweep's folder")
-    reading = parser.add_argument_group("what is what in the file")
-    reading.add_argument("--variable", metavar="NAME", help="array or variable of the signals")
-    reading.add_argument("--time", metavar="NAME", help="column, array or dimension of the times")
-    reading.add_argument("--step", type=float, metavar="X", help="time between two samples")
-    reading.add_argument("--transpose", action="store_true", help="rows are nodes")
-    reading.add_argument(
-        "--select",
-        action="append",
-        default=[],
-        metavar="NAME=INDEX",
-        help="what to take along another dimension (NetCDF, Zarr); may be repeated",
+    rescale = "find those factors: median frequency and amplitude become those of the atlas's runs"
+    setting = "a setting of the table [features], e.g. n_peaks=5; may be repeated"
+    along = "what to take along another dimension (NetCDF, Zarr); may be repeated"
+    parser.add_argument("file", **value("FILE", Path, "the recording"))
+    add_group(
+        parser,
+        "what is what in the file",
+        variable=value("NAME", str, "array or variable of the signals"),
+        time=value("NAME", str, "column, array or dimension of the times"),
+        step=value("X", float, "time between two samples"),
+        transpose=flag("rows are nodes"),
+        select=value("NAME=INDEX", str, along, action="append", default=[]),
     )
-    nodes = parser.add_argument_group("nodes and times")
-    nodes.add_argument("--open", action="store_true", help="a chain: the last node ends it")
-    nodes.add_argument(
-        "--order", metavar="LIST", help="nodes by name or number from 0, with commas; or a file"
+    add_group(
+        parser,
+        "nodes and times",
+        open=flag("a chain: the last node ends it"),
+        order=value("LIST", str, "nodes by name or number from 0, with commas; or a file"),
+        drop=value("LIST", str, "columns to leave out, by name or number; or a file of them"),
+        start=value("T", float, "first time to take"),
+        end=value("T", float, "last time to take"),
+        bridge=value("N", int, "missing samples in a row to interpolate (default: 3)", default=3),
+        lowpass=value("F", float, "damp frequencies above F, in the file's unit"),
+        factors=value("T,U", str, "multiply times by T and signals by U: the atlas's units"),
+        rescale=flag(rescale),
+        set=value("KEY=VALUE", str, setting, dest="overrides", action="append", default=[]),
     )
-    nodes.add_argument(
-        "--drop", metavar="LIST", help="columns to leave out, by name or number; or a file of them"
+    add(
+        parser,
+        "--json",
+        atlas=value("STORE", Path, "a reduced sweep's folder"),
+        out=value("DIR", folder_name, "figures (default: FILE-classified)"),
+        no_figures=flag("no figures"),
     )
-    nodes.add_argument("--start", type=float, metavar="T", help="first time to take")
-    nodes.add_argument("--end", type=float, metavar="T", help="last time to take")
-    nodes.add_argument(
-        "--bridge",
-        type=int,
-        default=3,
-        metavar="N",
-        help="samples missing in a row that are interpolated (default: 3)",
-    )
-    nodes.add_argument(
-        "--lowpass", type=float, metavar="F", help="damp frequencies above F, in the file's unit"
-    )
-    nodes.add_argument(
-        "--factors", metavar="T,U", help="multiply times by T and signals by U: the atlas's units"
-    )
-    nodes.add_argument(
-        "--rescale",
-        action="store_true",
-        help="find those factors: median frequency and amplitude become those of the atlas's runs",
-    )
-    nodes.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="a setting of the table [features], e.g. n_peaks=5; may be repeated",
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument(
-        "--out", type=folder_name, metavar="DIR", help="figures (default: FILE-classified)"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="no figures")
 
 
 def execute(args: Namespace) -> int:

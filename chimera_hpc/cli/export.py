@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.arguments import add, flag, store_path, value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,9 +28,12 @@ EPILOG = """examples:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=".csv, .nc or .zip")
-    parser.add_argument("--series", action="store_true", help="the series of u too (.nc)")
+    add(
+        parser,
+        "folder",
+        to=value("FILE", Path, ".csv, .nc or .zip", required=True),
+        series=flag("the series of u too (.nc)"),
+    )
 
 
 def execute(args: Namespace) -> int:

@@ -6,14 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import (
-    add_job,
-    add_out,
-    add_yes,
-    load_job,
-    store_path,
-    sweep_folder,
-)
+from chimera_hpc.cli.arguments import add, load_job, store_path, sweep_folder
 from chimera_hpc.cli.estimate import estimate, refuse_absurd
 
 EPILOG = """examples:
@@ -28,9 +21,7 @@ computes them.
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_job(parser)
-    add_out(parser)
-    add_yes(parser)
+    add(parser, "job", "--set", "--out", "--yes")
 
 
 def execute(args: Namespace) -> int:

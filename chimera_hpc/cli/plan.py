@@ -5,14 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import (
-    add_block,
-    add_job,
-    add_out,
-    add_yes,
-    load_job,
-    sweep_folder,
-)
+from chimera_hpc.cli.arguments import add, load_job, sweep_folder
 from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, refuse_absurd
 
 EPILOG = """examples:
@@ -26,10 +19,7 @@ where it would be stored is refused with exit status 2, by `run` too; --yes acce
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_job(parser)
-    add_out(parser)
-    add_block(parser)
-    add_yes(parser)
+    add(parser, "job", "--set", "--out", "--block", "--yes")
 
 
 def execute(args: Namespace) -> int:

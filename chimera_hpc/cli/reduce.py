@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
-from chimera_hpc.cli.arguments import STORE, add_folder, store_path
+from chimera_hpc.cli.arguments import STORE, add, flag, store_path
 from chimera_hpc.cli.reporting import reduce_and_report
 from chimera_hpc.store.ledger import read_ledger
 
@@ -18,11 +18,8 @@ EPILOG = """examples:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument("--no-figures", action="store_true", help="results.json only")
-    parser.add_argument(
-        "--complete", action="store_true", help="only if every point was tried; else exit status 75"
-    )
+    complete = "only if every point was tried; else exit status 75"
+    add(parser, "folder", no_figures=flag("results.json only"), complete=flag(complete))
 
 
 def execute(args: Namespace) -> int:

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.cli.arguments import (
-    add_executor,
-    add_folder,
-    add_overrides,
-    add_reduction,
-    executor_of,
-    start_early,
-    store_path,
-)
+from chimera_hpc.cli.arguments import EXECUTOR, add, executor_of, start_early, store_path, value
 from chimera_hpc.cli.ending import end, interrupted
 from chimera_hpc.cli.reporting import load_reduction
 from chimera_hpc.job import Sweep
@@ -45,17 +37,14 @@ _FAILURES = {code.name.lower(): code for code in Status if code.is_failure}
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument(
-        "--status",
-        metavar="NAME[,NAME]",
-        help="only points that failed in these ways (default: all failed points)",
+    failures = "only points that failed in these ways (default: all failed points)"
+    add(
+        parser,
+        *("folder", "--set", *EXECUTOR, "--no-figures", "--strict"),
+        status=value("NAME[,NAME]", str, failures),
+        time_out=value("S", float, "seconds of wall time per point"),
+        max_steps=value("N", int, "steps per point"),
     )
-    parser.add_argument("--time-out", type=float, metavar="S", help="seconds of wall time a point")
-    parser.add_argument("--max-steps", type=int, metavar="N", help="steps a point")
-    add_overrides(parser)
-    add_executor(parser)
-    add_reduction(parser)
 
 
 def execute(args: Namespace) -> int:

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.cli.arguments import (
+    EXECUTOR,
     STORE,
-    add_block,
-    add_executor,
-    add_job,
-    add_out,
-    add_reduction,
-    add_resubmit,
+    add,
     add_slurm,
-    add_yes,
     executor_of,
     load_job,
     start_early,
@@ -45,14 +40,9 @@ time or memory are tried run.attempts times in all; `retry` tries failed points 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_job(parser)
-    add_out(parser)
-    add_executor(parser)
+    add(parser, "job", "--set", "--out", *EXECUTOR)
     add_slurm(parser)
-    add_resubmit(parser)
-    add_block(parser)
-    add_reduction(parser)
-    add_yes(parser)
+    add(parser, "--resubmit", "--block", "--no-figures", "--strict", "--yes")
 
 
 def execute(args: Namespace) -> int:

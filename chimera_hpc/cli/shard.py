@@ -11,14 +11,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import (
-    add_out,
-    add_overrides,
-    add_resubmit,
-    load_job,
-    store_path,
-    sweep_folder,
-)
+from chimera_hpc.cli.arguments import add, load_job, store_path, sweep_folder, value
 from chimera_hpc.cli.resubmitting import go_on
 from chimera_hpc.cli.run import open_or_plan
 from chimera_hpc.run.choice import ExecutorChoice
@@ -42,14 +35,13 @@ _ELEMENT = "SLURM_ARRAY_TASK_ID"
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument(
-        "folder", type=Path, metavar="DIR", help="the sweep's folder, or a job file"
+    parser.add_argument("folder", **value("DIR", Path, "the sweep's folder, or a job file"))
+    add(
+        parser,
+        *("--set", "--out", "--resubmit"),
+        of=value("N", int, "number of shares", required=True),
+        index=value("I", int, "which share, from 0"),
     )
-    parser.add_argument("--of", type=int, required=True, metavar="N", help="number of shares")
-    parser.add_argument("--index", type=int, metavar="I", help="which share, from 0")
-    add_overrides(parser)
-    add_out(parser)
-    add_resubmit(parser)
 
 
 def execute(args: Namespace) -> int:

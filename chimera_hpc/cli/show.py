@@ -11,7 +11,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add_folder, add_point, find_points, folder_name, store_path
+from chimera_hpc.cli.arguments import add, find_points, folder_name, store_path, value
 from chimera_hpc.cli.ending import name_of
 
 if TYPE_CHECKING:
@@ -40,25 +40,14 @@ _FRAMES_A_PERIOD = 25
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    add_point(parser)
-    parser.add_argument(
-        "--node",
-        type=int,
-        metavar="J",
-        help="node of portrait and spectrum (default: features.reference_node)",
-    )
-    parser.add_argument(
-        "--window", type=int, default=0, metavar="K", help="window of the spectrum (default: 0)"
-    )
-    parser.add_argument(
-        "--out", type=folder_name, metavar="DIR", help="where figures go (default: figures/show)"
-    )
-    parser.add_argument(
-        "--animate", type=Path, metavar="FILE", help="write the ring's motion, .gif or .mp4"
-    )
-    parser.add_argument(
-        "--periods", type=float, default=5.0, metavar="N", help="periods of it (default: 5)"
+    add(
+        parser,
+        *("folder", "point"),
+        node=value("J", int, "node of portrait and spectrum (default: features.reference_node)"),
+        window=value("K", int, "window of the spectrum (default: 0)", default=0),
+        out=value("DIR", folder_name, "where figures go (default: figures/show)"),
+        animate=value("FILE", Path, "write the ring's motion, .gif or .mp4"),
+        periods=value("N", float, "periods of it (default: 5)", default=5.0),
     )
 
 

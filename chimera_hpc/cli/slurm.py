@@ -11,15 +11,13 @@ from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.cli.arguments import (
     STORE,
-    add_block,
-    add_job,
-    add_out,
-    add_resubmit,
+    add,
     add_slurm,
-    add_yes,
+    flag,
     load_job,
     slurm_options_of,
     sweep_folder,
+    value,
 )
 from chimera_hpc.cli.run import open_or_plan
 from chimera_hpc.job.tables import Slurm
@@ -45,21 +43,19 @@ whether it would take the job (sbatch --test-only), and after an array a second 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_job(parser)
-    add_out(parser)
-    add_block(parser)
-    add_yes(parser)
-    parser.add_argument("--mode", choices=MODES, default="array", help="which way (default: array)")
-    parser.add_argument("--workers", type=int, metavar="N", help="worker processes in all")
-    parser.add_argument("--array", type=int, metavar="N", help="elements of the job array")
-    parser.add_argument("--at-once", type=int, metavar="N", help="of which run at a time, at most")
+    add(parser, "job", "--set", "--out", "--block", "--yes", "--resubmit")
+    mode = "which way (default: array)"
+    parser.add_argument("--mode", choices=MODES, default="array", help=mode)
     add_slurm(parser)
-    add_resubmit(parser)
-    parser.add_argument(
-        "--drain", type=float, metavar="S", help="be over S seconds before a job's time limit"
+    add(
+        parser,
+        workers=value("N", int, "worker processes in all"),
+        array=value("N", int, "elements of the job array"),
+        at_once=value("N", int, "of which run at a time, at most"),
+        drain=value("S", float, "be over S seconds before a job's time limit"),
+        submit=flag("submit it, too"),
+        no_reduce=flag("no job that reduces afterwards"),
     )
-    parser.add_argument("--submit", action="store_true", help="submit it, too")
-    parser.add_argument("--no-reduce", action="store_true", help="no job that reduces afterwards")
 
 
 def execute(args: Namespace) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
-from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.arguments import add, flag, store_path
 from chimera_hpc.cli.cell_map import Cells, draw
 from chimera_hpc.cli.estimate import in_time
 from chimera_hpc.store.claims import live_claims
@@ -46,10 +46,12 @@ _PAUSE = 60.0
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--failures", action="store_true", help="list every failed point too")
-    parser.add_argument("--no-map", action="store_true", help="leave out the map of cells")
+    add(
+        parser,
+        *("folder", "--json"),
+        failures=flag("list every failed point too"),
+        no_map=flag("leave out the map of cells"),
+    )
 
 
 def execute(args: Namespace) -> int:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.arguments import add, flag, store_path, value
 from chimera_hpc.cli.ending import MOST_LINES, name_of
 from chimera_hpc.store.claims import claim_block
 from chimera_hpc.store.ledger import digests
@@ -36,13 +36,14 @@ _SAMPLE = 0.01
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument("--stored", action="store_true", help="decode all that is stored")
-    parser.add_argument(
-        "--forget", action="store_true", help="forget damaged blocks: `run` computes them anew"
+    add(
+        parser,
+        "folder",
+        stored=flag("decode all that is stored"),
+        forget=flag("forget damaged blocks: `run` computes them again"),
+        sample=value("SHARE", float, "share of points, 0 to 1"),
+        seed=value("N", int, "chooses the sample", default=0),
     )
-    parser.add_argument("--sample", type=float, metavar="SHARE", help="share of points, 0 to 1")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="chooses the sample")
 
 
 def execute(args: Namespace) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add_folder, store_path
+from chimera_hpc.cli.arguments import add, store_path, value
 from chimera_hpc.cli.cell_map import Cells
 from chimera_hpc.cli.status import lines_of, map_of, state_of
 from chimera_hpc.store.ledger import LedgerScan, read_metadata, scan_ledger
@@ -29,10 +29,7 @@ _OTHER_LINES = 14
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    parser.add_argument(
-        "--every", type=_seconds, default=2.0, metavar="SECONDS", help="pause (default: 2)"
-    )
+    add(parser, "folder", every=value("SECONDS", _seconds, "pause (default: 2)", default=2.0))
 
 
 def execute(args: Namespace) -> int:

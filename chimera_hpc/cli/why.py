@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
-from chimera_hpc.cli.arguments import add_folder, add_point, find_points, store_path
+from chimera_hpc.cli.arguments import add, find_points, store_path
 from chimera_hpc.cli.ending import name_of
 from chimera_hpc.store.claims import live_claims
 
@@ -24,8 +24,7 @@ _MOST = 10
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_folder(parser)
-    add_point(parser)
+    add(parser, "folder", "point")
 
 
 def execute(args: Namespace) -> int:
