@@ -40,7 +40,7 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
 
-# Notebooks are shown as they were executed; `scripts/docs --notebooks` executes them anew.
+# Notebooks are shown as they were executed; `scripts/docs --notebooks` executes them again.
 nb_execution_mode = "off"
 myst_heading_anchors = 3
 # MathML is drawn by the browser itself: pages need no network.

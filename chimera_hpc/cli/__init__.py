@@ -46,14 +46,14 @@ COMMANDS = (
     Command("reduce", "make results.json, figures and the report from what is in the store"),
     Command(
         "show",
-        "compute a point or a cell anew and draw it: space-time plot, profiles, portrait, spectrum",
+        "recompute a point or a cell and draw it: space-time plot, profiles, portrait, spectrum",
     ),
     Command(
         "classify", "measure a recording of your own, and classify it by the classes of a sweep"
     ),
     Command("retry", "compute failed points once more, and reduce"),
     Command("why", "explain what became of one point: status, tries, who computed it, with what"),
-    Command("verify", "decode what is stored, and compute a sample of the points anew"),
+    Command("verify", "decode what is stored, and recompute a sample of the points"),
     Command("audit", "say how firm the classes are: recompute a sample, resample the seeds"),
     Command(
         "extend", "add points to a sweep: more seeds, new values on any axis; computes nothing"

@@ -50,7 +50,7 @@ def lines(
         yield features.status.sentence
     else:
         yield f"oscillates; {features.n_windows} windows"
-        yield f"  {found.samples_a_period:.3g} samples a period in the recording"
+        yield f"  {found.samples_a_period:.3g} samples per period in the recording"
         for name in ("amplitude", "frequency", "baseline"):
             values = getattr(features, name)
             yield (

@@ -85,7 +85,7 @@ def _more_to_do(left: int, store: Store, args: Namespace, status: Exit) -> int:
 
 
 def _reduce(driver: Driver, folder: Path, make_figures: bool) -> list[str]:
-    """Reduce the store; blocks that turn out to be damaged are computed anew first.
+    """Reduce the store; blocks that turn out to be damaged are computed again first.
 
     Returns what is still damaged.
     """
@@ -99,7 +99,7 @@ def _reduce(driver: Driver, folder: Path, make_figures: bool) -> list[str]:
             if _shows_up(driver.store, error.damage):
                 continue
             found = [str(error.damage)]
-            print(f"damaged, to be computed anew: {error.damage}")
+            print(f"damaged, to be computed again: {error.damage}")
             driver.store.discard_block(error.damage.block)
             driver.work()
             if driver.should_stop():

@@ -20,7 +20,7 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep export results/quickstart --to quickstart.nc
   python -m chimera_hpc.sweep export results/quickstart --to quickstart.zip
 
-.csv: a line a point: parameters, status, V_theta, V_a, V_Omega, class in each cut.
+.csv: one line per point: parameters, status, V_theta, V_a, V_Omega, class in each cut.
 .nc: NetCDF of all features, scalars and the ledger, and of the series with --series.
 .zip: job file, provenance of every run, results.json, table, figures and report.
 """

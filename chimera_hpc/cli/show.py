@@ -1,4 +1,4 @@
-"""``show``: a point, or a cell, computed anew and drawn."""
+"""``show``: a point, or a cell, computed again and drawn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep show results/quickstart P=12 --node 20 --window 2
   python -m chimera_hpc.sweep show results/quickstart P=12 seed=3 --animate ring.gif
 
-The run is integrated anew by the code that made the sweep, and what comes out is compared with the
+The run is integrated again by the code that made the sweep, and what comes out is compared with the
 store bit for bit; exit status 1: it comes out otherwise. Values that select one cell and no seed
 show its seeds side by side, and the portrait and spectrum of the one that stands for them: of the
 most frequent class, nearest to the median of its variations. Nodes and windows count from 0 here,
@@ -146,7 +146,7 @@ def _stem(store: Store, point: int, with_seed: bool) -> str:
 def _draw(
     store: Store, runs: list[Replay], focus: Replay, node: int, window: int, folder: Path, stem: str
 ) -> list[Path]:
-    """Draw all that there is to draw; returns the PNG files, each with a PDF beside it."""
+    """Draw all that there is to draw; returns the PNG files, each with a PDF next to it."""
     from chimera_hpc.plot.indicators import fourier_indicators, profiles_of
     from chimera_hpc.plot.portrait import ring_portrait
     from chimera_hpc.plot.spacetime import space_time

@@ -35,7 +35,7 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep status results/quickstart --json
   python -m chimera_hpc.sweep status results/quickstart --failures
 
-The map has a sign a cell, and colours on a terminal unless NO_COLOR is set: capital letters are
+The map has one sign per cell, and colours on a terminal unless NO_COLOR is set: capital letters are
 classes (O ordered, C chimera, D disordered, S steady) once the sweep was reduced. `watch` shows
 the same again and again.
 """
@@ -148,10 +148,10 @@ def lines_of(state: Mapping[str, Any]) -> list[str]:
     )
     if state["points_a_second"]:
         rate, left = state["points_a_second"], state["seconds_left"]
-        lines.append(f"  {rate:.3g} points a second now, about {in_time(left)} to go")
+        lines.append(f"  {rate:.3g} points per second now, about {in_time(left)} to go")
     elif state["core_seconds_left"]:
         left, mean = state["core_seconds_left"], state["seconds_a_point"]
-        lines.append(f"  about {in_time(left)} of one core to go, {mean:.3g} s a point")
+        lines.append(f"  about {in_time(left)} of one core to go, {mean:.3g} s per point")
     return lines
 
 

@@ -25,11 +25,11 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep verify results/quickstart --stored --forget
   python -m chimera_hpc.sweep verify results/quickstart --sample 0.01
 
---stored decodes every chunk and computes every digest anew from the stored bytes; --sample computes
-this share of the points anew, at least one, compares digests, and says what differs in code,
+--stored decodes every chunk and recomputes every digest from the stored bytes; --sample computes
+this share of the points again, at least one, compares digests, and says what differs in code,
 libraries or processor between the runs that made these points and now. Without either: both, with a
 sample of 0.01. Exit status 1: something is not as it was written, or comes out otherwise. --forget
-has `run` compute damaged blocks anew.
+has `run` compute damaged blocks again.
 """
 _SAMPLE = 0.01
 
@@ -77,7 +77,7 @@ def _verify_stored(store: Store, forget: bool) -> bool:
     if damage and forget:
         _forget(store, damage)
     elif damage:
-        print("  verify --forget, then run, computes these blocks anew")
+        print("  verify --forget, then run, computes these blocks again")
     return not damage
 
 
@@ -91,17 +91,17 @@ def _forget(store: Store, damage: list[Damage]) -> None:
         store.discard_block(block)
         claim.release()
         forgotten += 1
-    print(f"  {forgotten} blocks forgotten; run computes them anew")
+    print(f"  {forgotten} blocks forgotten; run computes them again")
 
 
 def _verify_sample(store: Store, share: float, seed: int) -> bool:
-    """Compute some points anew, and compare their digests with the ledger's."""
+    """Compute some points again, and compare their digests with the ledger's."""
     ledger = store.ledger()
     results = np.flatnonzero((ledger["status"] >= 1) & (ledger["status"] <= 3))
     count = min(len(results), max(1, round(share * len(results)))) if share > 0 else 0
     chosen = np.sort(np.random.default_rng(seed).choice(results, count, replace=False))
     different = [i for part in _parts(store, chosen) for i in _different(store, ledger, part)]
-    print(f"sample: {count} of {len(results)} points computed anew, {len(different)} different")
+    print(f"sample: {count} of {len(results)} points recomputed, {len(different)} different")
     for i, size in different[:MOST_LINES]:
         print(f"  {name_of(store, i)}: largest difference of a feature or scalar {size:.3g}")
     wrong = [i for i, _ in different]

@@ -21,7 +21,7 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep watch /scratch/me/plane --every 10
 
 It reads the store alone: start and stop it at will, on any machine that sees the folder. It ends
-when every point was tried and nobody works on the sweep, with exit status 0, or 1 if some failed.
+when every point was tried and no one works on the sweep, with exit status 0, or 1 if some failed.
 """
 _OTHER_LINES = 14
 """Lines of the screen that the map cannot have."""
@@ -76,7 +76,7 @@ class _View:
 
     @property
     def over(self) -> bool:
-        """Whether every point was tried and nobody works on any."""
+        """Whether every point was tried and no one works on any."""
         return not self.state["pending"] and not self.state["blocks_running"]
 
     @property

@@ -208,11 +208,11 @@ class Reduction(Table):
     )
     atlas: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
         (),
-        description="Sweeps whose classes judge the runs: folders beside this one, or paths. The "
+        description="Sweeps whose classes judge the runs: folders next to this one, or paths. The "
         "first judges, the others are the check.",
     )
     beside: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
-        (), description="Sweeps whose curves are drawn with this one's: folders beside this one."
+        (), description="Sweeps whose curves are drawn with this one's: folders next to this one."
     )
     deltas: Annotated[tuple[Annotated[float, Field(ge=0)], ...], BeforeValidator(_as_tuple)] = (
         Field((), description="Thresholds of the strength of incoherence.")

@@ -29,7 +29,7 @@ def load_atlas(folder: str | Path) -> Atlas:
 
 
 def atlases_of(folder: Path, names: Sequence[str], say: Callable[[str], None]) -> dict[str, Atlas]:
-    """Load the atlases that a job names, from folders beside the sweep's own or from paths."""
+    """Load the atlases that a job names, from folders next to the sweep's own or from paths."""
     found: dict[str, Atlas] = {}
     for name in names:
         place = sibling(folder, name)
@@ -46,7 +46,7 @@ def atlases_of(folder: Path, names: Sequence[str], say: Callable[[str], None]) -
 
 
 def sibling(folder: Path, name: str) -> Path:
-    """Return the folder that a name stands for: beside the sweep's own, or a path as it is."""
+    """Return the folder that a name stands for: next to the sweep's own, or a path as it is."""
     path = Path(name)
     return path if path.is_absolute() or len(path.parts) > 1 else folder.absolute().parent / name
 

@@ -3,8 +3,8 @@
 A sample of the points is computed again in three ways (see `audit_runs`): at 100 times tighter
 tolerances, from a start moved by 1e-13, and over a run five times as long. All runs are labelled by
 the frozen classes of the last reduction. Trajectories near the border of two classes are chaotic,
-so what changes at tighter tolerances means something only beside what the moved start changes: that
-one is the control. And the seeds of every cell are resampled: how often its modal class stays.
+so what changes at tighter tolerances is compared with what the moved start changes, which is the
+control. The seeds of every cell are resampled, too: how often its modal class stays.
 """
 
 from __future__ import annotations

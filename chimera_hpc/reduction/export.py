@@ -29,7 +29,7 @@ _BUNDLED = ("results.json", "report.html", "run.log")
 
 
 def to_csv(store: Store, target: Path, series: bool = False) -> None:
-    """Write a line a point: parameters, status, triplet, class in each cut that was made."""
+    """Write one line per point: parameters, status, triplet, class in each cut that was made."""
     write_atomically(target, table(store).encode())
 
 

@@ -65,7 +65,7 @@ class Replay:
 
 
 def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
-    """Compute points of a store anew, all at once; their bits do not depend on one another."""
+    """Compute points of a store again, all at once; their bits do not depend on one another."""
     from chimera_hpc.run.block import run_block, store_as
 
     which = np.asarray(chosen, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The runs that a reduction draws: read from the store, or integrated anew."""
+"""The runs that a reduction draws: read from the store, or integrated again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The modal classes as text: a line a cell, a map of letters, or a count."""
+"""The modal classes as text: one line per cell, a map of letters, or a count."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Content:
         """Read the sweep in a folder.
 
         The tree is that of the last reduction where that is in step with the ledger; otherwise it
-        is grown anew, over at most `largest_tree` points (`classify`'s own limit by default).
+        is grown again, over at most `largest_tree` points (`classify`'s own limit by default).
 
         Raises BadInput: no store in the folder.
         Raises DamagedChunk: A chunk of results that the ledger vouches for is missing or damaged.

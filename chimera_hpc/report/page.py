@@ -64,7 +64,7 @@ def write_report(
 
     folder: the folder that holds store.zarr.
     most_pictures: cells that carry a picture and profiles at most.
-    replay: whether runs whose series the store does not keep may be computed anew for their
+    replay: whether runs whose series the store does not keep may be computed again for their
         pictures.
     largest_tree: points in the tree, where the last reduction's is out of date (see
         `Content.read`).

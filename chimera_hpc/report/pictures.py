@@ -1,4 +1,4 @@
-"""One run a cell to look at: a small space-time picture and the profiles of its features."""
+"""One run per cell to look at: a small space-time picture and the profiles of its features."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _BATCH = 16
 
 @dataclass(frozen=True)
 class Plates:
-    """What cells carry beside their numbers."""
+    """What cells carry in addition to their numbers."""
 
     by_cell: dict[int, dict[str, Any]]
     """Plain values for JSON by the number of the cell; the key `image` may be missing."""
@@ -72,7 +72,7 @@ def plates(
     most_cells: int = MOST_CELLS,
     replay: bool = True,
 ) -> Plates:
-    """Make the pictures and profiles of one run a cell, as far as their budget goes.
+    """Make the pictures and profiles of one run per cell, as far as their budget goes.
 
     The run is one of the cell's modal class, one whose series is kept where there is such a run.
     `shown` are the cells to choose from.
@@ -154,7 +154,7 @@ def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array
 
 
 def _replay(content: Content, points: NDArray[np.int64]) -> Array:
-    """Compute the series (n, T, N) of points anew."""
+    """Compute the series (n, T, N) of points again."""
     if not len(points):
         return np.empty((0, 0, 0))
     from chimera_hpc.run.block import run_block

@@ -78,7 +78,7 @@ def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
     """Write a signal (N, T) as a store keeps it, and return what the store gives back, in `back`.
 
     What is measured is what is stored: a maximum between two nearly equal samples would otherwise
-    move to the other one, and its window with it, when the features are computed anew from the
+    move to the other one, and its window with it, when the features are recomputed from the
     store. Values beyond the range of int16, which the store does not keep, are rounded alike.
 
     stored (T, N): in the type of the store.

@@ -80,7 +80,7 @@ def _check_right_hand_side(model: Model, state: Array) -> None:
             )
         if alone[:, 0].tobytes() != together[:, lane].tobytes():
             raise BadInput(
-                "the right-hand side gives a run other numbers beside others than alone: "
+                "the right-hand side gives a run other numbers next to others than alone: "
                 "lane by lane, only its own columns of y, dy and p may be used"
             )
 

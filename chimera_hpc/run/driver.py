@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _CLUSTER_TRIES = 3
 """Times that a cluster may be lost before a block is done."""
 _BLOCK_TRIES = 3
-"""Errors of the operating system after which a block is put aside."""
+"""Errors of the operating system after which a block is left for a later run."""
 _LONGEST_WAIT = 10.0
 _RUNS_COMPARED = 20
 
@@ -56,7 +56,7 @@ class Driver:
         self.ended_by: str | None = None
         """What made going on hopeless, on one line."""
         self.broken: dict[int, BlockError] = {}
-        """Blocks that were put aside, and why."""
+        """Blocks that were left for a later run, and why."""
         self._errors: Counter[int] = Counter()
         self._machines: list[str] = []
         self._late = False
@@ -75,13 +75,13 @@ class Driver:
             self._work()
 
     def should_stop(self) -> bool:
-        """Return whether somebody asked to stop, or going on has become hopeless."""
+        """Return whether a signal asked to stop, or going on has become hopeless."""
         if self.ended_by is None and time_to_leave():
             self.ended_by = NEAR
         return self.stop() or self.ended_by is not None
 
     def pending(self) -> list[int]:
-        """Return the blocks with something to do that were not put aside."""
+        """Return the blocks with something to do that were not left for a later run."""
         retry = self.retry
         blocks = self.store.pending(
             True, attempts=retry.attempts, statuses=retry.statuses, before=retry.before
@@ -90,7 +90,7 @@ class Driver:
         return [b for b in blocks if b not in self.broken and b % count == index]
 
     def _count(self) -> None:
-        """Have the reporter count what the ledger says, whoever did it."""
+        """Have the reporter count what the ledger says, by whichever run."""
         retry, ledger = self.retry, self.store.ledger()
         to_do = unfinished(ledger, retry.attempts, retry.statuses, retry.before)
         failed = ~to_do & (ledger["status"] > max(RESULTS))
@@ -243,7 +243,7 @@ class Driver:
             self.report.refresh(self.reporter.note)
 
     def _record(self, message: RunMessage) -> None:
-        """Write beside the run's record where its points were computed, and until when."""
+        """Write next to the run's record where its points were computed, and until when."""
         from chimera_hpc.store.runs import record_work
 
         now = datetime.now(UTC).isoformat(timespec="seconds")
@@ -260,7 +260,7 @@ class Driver:
             self.ended_by = self.ended_by or error.text
         elif error.errno is None or self._errors[block] >= _BLOCK_TRIES:
             self.broken[block] = error
-            self.reporter.say(f"block {block} is put aside: {error.text}")
+            self.reporter.say(f"block {block} is left for a later run: {error.text}")
 
 
 def changes(store: Store, info: dict[str, Any], strict: bool) -> list[str]:

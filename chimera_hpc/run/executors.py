@@ -123,7 +123,7 @@ class _Window:
 
     def submit(self, block: int) -> None:
         self.submitted += 1
-        # The key is new each time: the scheduler shall not remember how often a block failed.
+        # The key is new each time: the scheduler must not count how often a block failed.
         future = self.client.submit(
             do_block,
             *(self.message, block),

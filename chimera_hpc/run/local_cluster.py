@@ -137,7 +137,7 @@ def _connected(scheduler_file: Path, patience: float) -> Client:
 
     deadline = time.monotonic() + patience
     while True:
-        # Each try reads the file anew: another scheduler may have been started meanwhile.
+        # Each try reads the file again: another scheduler may have been started meanwhile.
         try:
             address = json.loads(scheduler_file.read_bytes())["address"]
             return Client(address, timeout=min(patience, 5.0))
@@ -174,7 +174,7 @@ def _prepare(client: Client) -> None:
     try:
         client.register_plugin(SignalPlugin())
     except Exception as error:
-        # Workers that somebody else has started: they may lack anything.
+        # Workers that another program has started: they may lack anything.
         text = " ".join(f"{type(error).__name__}: {error}".split())
         raise BadInput(f"the workers cannot use this package: {text}") from None
 

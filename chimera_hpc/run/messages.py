@@ -1,4 +1,4 @@
-"""What a run tells whoever works for it, and what it is told of each block.
+"""What a run tells its workers, and what they answer for each block.
 
 Kept apart from `work`, so that a driver whose workers integrate need not load what integrates.
 """
@@ -16,7 +16,7 @@ from chimera_hpc.store.ledger import NO_LIMIT
 
 @dataclass(frozen=True)
 class RetryPolicy:
-    """Which failed points are run once more, beside the points that never ran."""
+    """Which failed points are run once more, in addition to the points that never ran."""
 
     attempts: int = 0
     """Those that were tried fewer times than this."""
@@ -28,9 +28,9 @@ class RetryPolicy:
     before: int = NO_LIMIT
     """Those that failed in a run below this number."""
     time_out: float | None = None
-    """Seconds of wall time a point in place of `integrator.time_out`."""
+    """Seconds of wall time per point in place of `integrator.time_out`."""
     max_steps: int | None = None
-    """Steps a point in place of `integrator.max_steps`."""
+    """Steps per point in place of `integrator.max_steps`."""
 
     def of_run(self, run: int) -> RetryPolicy:
         """Return the same for a run that has got its number."""
@@ -47,7 +47,7 @@ class RetryPolicy:
 
 @dataclass(frozen=True)
 class RunMessage:
-    """What a run tells whoever works for it."""
+    """What a run tells its workers."""
 
     store: Path
     run: int

@@ -202,7 +202,7 @@ class _Block:
         except OSError:
             raise
         except Exception as error:
-            # An error in the code of a model: the other points of the block shall not suffer.
+            # An error in the code of a model: the other points of the block must not suffer.
             if len(rows) > 1:
                 return None
             where = " ".join(f"{name}={points.row(0)[name]}" for name in points.axes)

@@ -37,7 +37,7 @@ class SignalPlugin(WorkerPlugin):
 
         A terminal sends SIGINT to all processes of a run at once; the driver stops the workers in
         good order. A nanny ends a worker that uses too much memory with SIGTERM: the next owner of
-        its block shall know.
+        its block must know.
         """
         limit = getattr(worker.memory_manager, "memory_limit", None)
 
@@ -101,5 +101,5 @@ def _on(number: int, handler: Any) -> None:
     try:
         signal.signal(number, handler)
     except ValueError:
-        # Not in the main thread: a worker inside somebody's program, whose signals are his.
+        # Not in the main thread: a worker inside another program, which keeps its signals.
         return

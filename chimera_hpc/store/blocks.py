@@ -43,7 +43,7 @@ class DamagedChunk(RuntimeError):
     """A chunk that the ledger vouches for is missing or cannot be decoded; `damage` says which."""
 
     def __init__(self, damage: Damage) -> None:
-        super().__init__(f"{damage}; run the sweep again to have the block computed anew")
+        super().__init__(f"{damage}; run the sweep again to compute the block again")
         self.damage = damage
 
 

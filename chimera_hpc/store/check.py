@@ -20,7 +20,7 @@ def find_damaged(
     """Return what is damaged in the blocks that the ledger vouches for, ordered by block.
 
     Ledger chunks are always read whole. Of the other chunks presence and length are checked and, if
-    `deep`, they are decoded, and the digest of every point is computed anew from the bytes on the
+    `deep`, they are decoded, and the digest of every point is recomputed from the bytes on the
     disk. A missing chunk is looked for again until `patience` seconds are over: network file
     systems show new files late.
     """

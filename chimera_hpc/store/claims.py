@@ -1,12 +1,12 @@
-"""Who works on which block: one claim file an attempt, so that many runners share a store.
+"""Who works on which block: one claim file per attempt, so that many runners share a store.
 
 The file of attempt k on block i is ``claims/<i>.<k>.json`` inside the store. The block belongs to
 the highest attempt present. A claim is made by creating the next file exclusively, so that of many
-runners who find a block free, or a claim expired, exactly one gets it; there is no lock to be held
-and none to go stale (`flock` is not dependable on network file systems), and nothing is ever moved,
-so that nobody can push away a claim that was made since he looked. The file exists before the work
-begins: a block that kills its worker every time leaves a file each time, and its next owner sees
-them all in `Claim.lost`.
+runners who find a block free, or a claim expired, exactly one gets it. There is no lock that could
+go stale (`flock` is not dependable on network file systems), and files are never moved, so that no
+process can push away a claim that was made after it looked. The file exists before the work begins:
+a block that kills its worker every time leaves a file each time, and its next owner sees them all
+in `Claim.lost`.
 
 A claim is alive while its file's modification time, the heartbeat, is younger than `expiry` by the
 file server's own clock. A claim whose process is gone from this very machine is free at once.
@@ -90,7 +90,7 @@ class Claim:
         return True
 
     def still_mine(self) -> bool:
-        """Whether nobody took the block over. Asked again right before the ledger is written."""
+        """Whether no one took the block over. Asked again right before the ledger is written."""
         if max(_attempts(self.path.parent, self.block), default=0) != self.attempts:
             return False
         return _read(self.path).get("token") == self.token
@@ -151,7 +151,7 @@ def claim_block(
 
 
 def live_claims(store: Path) -> dict[int, Mapping[str, Any]]:
-    """Return the contents of the claim file of every block that somebody works on now."""
+    """Return the contents of the claim file of every block that is being worked on."""
     return {block: _read(path) for block, path, free in _highest(Path(store) / FOLDER) if not free}
 
 

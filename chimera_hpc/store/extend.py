@@ -40,7 +40,7 @@ def exclusive(path: Path) -> Iterator[None]:
     deadline = time.monotonic() + _PATIENCE
     while (claim := claim_block(path, _CLAIM, run=0, expiry=_EXPIRY)) is None:
         if time.monotonic() > deadline:
-            raise BadInput(f"{path}: somebody else keeps changing the store; try again later")
+            raise BadInput(f"{path}: another process keeps changing the store; try again later")
         time.sleep(0.1)
     try:
         yield
@@ -74,21 +74,21 @@ def extend(path: Path, sweeps: Sequence[Sweep], sweep: Sweep, block_size: int) -
 
 
 def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: Points) -> list[str]:
-    """Write anew what differs from the root metadata of a store; return a line each.
+    """Rewrite what differs from the root metadata of a store; return a line each.
 
     `root` are the metadata that count: those of the file, or of its copy when the file is damaged.
     """
     done = []
     if _json(path / METADATA) != root:
         write_atomically(path / METADATA, json.dumps(root, indent=1).encode())
-        done.append(f"{METADATA} written anew")
+        done.append(f"{METADATA} rewritten")
     for name, node in root["consolidated_metadata"]["metadata"].items():
         file = path / name / METADATA
         own = node if node["node_type"] == "array" else None
         if own is not None and name.partition("/")[0] != REDUCTION and _json(file) != own:
             file.parent.mkdir(exist_ok=True)
             write_atomically(file, json.dumps(own, indent=1).encode())
-            done.append(f"{name}/{METADATA} written anew")
+            done.append(f"{name}/{METADATA} rewritten")
     known = set(root["consolidated_metadata"]["metadata"])
     broken_off = [file for name in known for file in (path / name).glob("c.*.partial")]
     for file in broken_off:
@@ -97,7 +97,7 @@ def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: P
     columns = {name: column for name, column in points.columns.items() if name in known}
     if not _coordinates_hold(path, columns):
         write_coordinates(path, sweep, columns)
-        done.append("coordinates written anew")
+        done.append("coordinates rewritten")
     return done + ([f"{len(broken_off)} temporary files removed"] if broken_off else [])
 
 

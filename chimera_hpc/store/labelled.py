@@ -58,7 +58,7 @@ def open_sweep(path: str | Path) -> xr.Dataset:
         stored = xr.open_zarr(store.path, chunks=None)
     except (ValueError, KeyError, TypeError, OSError):
         # We know better than what the file says: its copy is sound.
-        raise BadInput(f"{store.path}: its metadata are damaged; `run` writes them anew") from None
+        raise BadInput(f"{store.path}: its metadata are damaged; `run` writes them again") from None
     ledger = store.ledger()
     dataset: xr.Dataset = stored.drop_vars(["features", "scalars", "ledger"])
     dataset = dataset.assign_coords(cell=("point", store.points.cells()[0], _attributes("cell")))

@@ -44,7 +44,7 @@ class LedgerScan:
     """Everything that the ledger says."""
 
     columns: dict[str, NDArray[np.int64]]
-    """One entry a point for each of `FIELDS`; status 255 and zeros where a point never ran."""
+    """One entry per point for each of `FIELDS`; status 255 and zeros where a point never ran."""
     written: NDArray[np.bool_]
     """Whether each block has a sound ledger chunk."""
     damaged: tuple[int, ...]

@@ -46,7 +46,7 @@ def merge(path: Path, stores: Sequence[Store]) -> Merged:
     """Create at `path` a store of all points of `stores`; all of it or nothing.
 
     A point that is in several stores is taken from the first one that has a result for it, else
-    from the first that tried it. Runs are numbered anew, store after store.
+    from the first that tried it. Runs are renumbered, store after store.
 
     Raises BadInput when the path exists or cannot be written, or the sweeps differ in more than
     their axes.

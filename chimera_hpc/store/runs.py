@@ -1,4 +1,4 @@
-"""One small file a run in the folder `runs` of a store: who wrote which points, with what, when."""
+"""One small file per run in the folder `runs` of a store: who wrote which points, how and when."""
 
 from __future__ import annotations
 

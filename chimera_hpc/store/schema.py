@@ -24,7 +24,7 @@ from chimera_hpc.job.registry import measures
 from chimera_hpc.store.ledger import FIELDS
 
 BLOCK_ARRAYS = ("u", "features", "scalars", "ledger")
-"""Arrays with one chunk a block, in the order in which a block is written."""
+"""Arrays with one chunk per block, in the order in which a block is written."""
 FEATURES = (
     "amplitude",
     "frequency",
@@ -148,7 +148,7 @@ def room(sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int) -> 
 def block_plans(
     sweep: Sweep, n_points: int, block_size: int, coordinates: str = ""
 ) -> list[ArrayPlan]:
-    """Return the arrays with a chunk a block, and `time` before them where series are kept."""
+    """Return the arrays with one chunk per block, and `time` before them where series are kept."""
 
     def plan(
         name: str, others: tuple[tuple[str, int], ...], dtype: str, fill: float, **attributes: Any

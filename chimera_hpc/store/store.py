@@ -158,7 +158,7 @@ class Store:
         return scan_ledger(self.path, self.metadata)
 
     def ledger(self) -> dict[str, NDArray[np.int64]]:
-        """Return the ledger's columns, one entry a point; status 255 where a point never ran."""
+        """Return the ledger's columns, one entry per point; status 255 where a point never ran."""
         return self.scan().columns
 
     def status(self) -> dict[Status, int]:
@@ -220,7 +220,7 @@ class Store:
     def repair(self) -> list[str]:
         """Put right what any process can, and return what that was, a line each.
 
-        Damaged metadata and coordinates are written anew; the temporary files of processes that
+        Damaged metadata and coordinates are rewritten; the temporary files of processes that
         are gone are removed, and their claims on finished blocks. Damaged blocks are not touched:
         `pending` lists them.
         """

@@ -72,7 +72,7 @@ def create_whole(path: Path, make: Callable[[Path], None]) -> None:
         os.rename(temporary, path)
         sync_folder(path.parent)
     except OSError as error:
-        # Where somebody else was faster, the rename fails: his folder is not empty.
+        # Where another process was faster, the rename fails: that folder is not empty.
         raise BadInput(f"{path}: no store can be made here: {_reason(error)}") from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
@@ -113,7 +113,7 @@ def write_root(path: Path, attributes: Mapping[str, Any]) -> None:
 
 
 def consolidate(path: Path, attributes: Mapping[str, Any] | None = None) -> None:
-    """Write the root metadata anew, with the present reduction and with new attributes if given.
+    """Rewrite the root metadata, with the present reduction and with new attributes if given.
 
     What is known of the other arrays stays: an extension that was killed has altered their own
     files already, but does not count.

@@ -77,7 +77,7 @@ def write_block(
 
 def _confirm(claim: Claim | None) -> None:
     if claim is not None and not claim.still_mine():
-        raise ClaimLost(f"block {claim.block} was taken over by somebody else")
+        raise ClaimLost(f"block {claim.block} was taken over by another process")
 
 
 def _stored(files: BlockFiles, block: int) -> tuple[Rows, NDArray[np.int64]]:

@@ -200,8 +200,8 @@ sweep, resampled:"""
 _PROJECTION = """## 10,000 cores and 10 million points
 
 No such machine was at hand: this is a simulation of the run, fed with what was measured here:
-{point:.1f} ms a point, {worker:.1f} ms a block on the worker (claim, write, flush),
-{scheduler:.2f} ms a block of the scheduler's processor time, {ledger:.0f} ns a point to read
+{point:.1f} ms per point, {worker:.1f} ms per block on the worker (claim, write, flush),
+{scheduler:.2f} ms per block of the scheduler's processor time, {ledger:.0f} ns per point to read
 the ledger."""
 
 _AT_SCALE = """\

@@ -154,7 +154,7 @@ def test_retry_refuses_what_it_cannot_use(
     assert len(err.splitlines()) == 1
 
 
-def test_damage_found_by_the_reduction_is_computed_anew(
+def test_damage_found_by_the_reduction_is_computed_again(
     job: Path, finished: Path, sweep: Run
 ) -> None:
     before = store_of(finished).ledger()
@@ -164,7 +164,7 @@ def test_damage_found_by_the_reduction_is_computed_anew(
     chunk.write_bytes(data)
     code, out, _ = sweep(*run_words(job, finished))
     assert code == 0
-    assert "damaged, to be computed anew: block 1, scalars: wrong checksum" in out
+    assert "damaged, to be computed again: block 1, scalars: wrong checksum" in out
     after = store_of(finished).ledger()
     assert (after["digest"] == before["digest"]).all()
     assert after["run"].tolist() == [1] * 4 + [2] * 4 + [1] * 7

@@ -1,4 +1,4 @@
-"""``show``: a point or a cell computed anew, compared with the store, and drawn."""
+"""``show``: a point or a cell computed again, compared with the store, and drawn."""
 
 from __future__ import annotations
 

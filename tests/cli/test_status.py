@@ -193,7 +193,7 @@ def test_time_to_go_is_told_while_somebody_works(tmp_path: Path, sweep: Run) -> 
     store = filled(tmp_path, blocks=2)
     assert claim_block(store.path, 2, 1) is not None
     _, out, _ = sweep("status", tmp_path)
-    assert "points a second now, about" in out
+    assert "points per second now, about" in out
     state = json.loads(sweep("status", tmp_path, "--json")[1])
     assert state["seconds_left"] == pytest.approx(7 / state["points_a_second"])
 

@@ -127,7 +127,7 @@ def test_verify_says_which_code_made_a_point_that_comes_out_otherwise(
     assert sweep("verify", finished, "--stored")[0] == 0
     code, out, _ = sweep("verify", finished, "--sample", "1")
     assert code == 1
-    assert "points computed anew, 1 different" in out
+    assert "points recomputed, 1 different" in out
     assert "largest difference of a feature or scalar 0.125" in out
     assert "run 1: python: 2.7.18 before" in out
 

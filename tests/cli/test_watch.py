@@ -46,7 +46,7 @@ def test_pipe_gets_a_line_at_each_change(tmp_path: Path) -> None:
     assert counts == [0, 4, 8, 12, 15]
 
 
-def test_terminal_is_drawn_anew_until_ctrl_c(tmp_path: Path) -> None:
+def test_terminal_is_redrawn_until_ctrl_c(tmp_path: Path) -> None:
     store = make_store(tmp_path)
     leader, follower = pty.openpty()
     environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "70", "LINES": "24"}

@@ -66,7 +66,7 @@ def test_log_gets_every_line_with_its_time(tmp_path: Path) -> None:
 
 def test_full_disk_is_no_reason_to_stop() -> None:
     with Reporter(10, Path("/dev/full"), Full()) as reporter:
-        reporter.say("nobody hears this")
+        reporter.say("no one hears this")
         reporter.add(10, 0)
     assert reporter.done == 10
 

@@ -191,7 +191,7 @@ def test_error_of_the_system_is_told_and_the_block_handed_back(
     monkeypatch.undo()
     compute(lambda sweep, points, _: done(sweep, points))
     assert do_block(message(store), 0).n_done == 4
-    # The first try came to nothing, but its claim was handed back: nobody died.
+    # The first try came to nothing, but its claim was handed back: no one died.
     assert store.ledger()["attempts"][:4].tolist() == [1, 1, 1, 1]
 
 

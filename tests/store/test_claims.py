@@ -31,7 +31,7 @@ def claim_file(store: Path, block: int | str, attempt: int = 1) -> Path:
 
 
 def make_foreign(claim: Claim) -> None:
-    """Have the claim look as if made on another machine, where nobody can look for its process."""
+    """Have the claim look as if made on another machine, where no one can look for its process."""
     info = json.loads(claim.path.read_bytes())
     claim.path.write_text(json.dumps({**info, "process": "00000000-1-1", "host": "elsewhere"}))
 
@@ -95,7 +95,7 @@ def test_late_awakened_owner_neither_refreshes_nor_releases_what_he_lost(tmp_pat
     assert list((tmp_path / "claims").iterdir()) == []
 
 
-def test_claim_made_anew_after_a_release_is_not_the_old_owners(tmp_path: Path) -> None:
+def test_claim_made_again_after_a_release_is_not_the_old_owners(tmp_path: Path) -> None:
     first = taken(tmp_path)
     claim_file(tmp_path, 3).unlink()
     second = taken(tmp_path)

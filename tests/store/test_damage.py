@@ -152,7 +152,7 @@ def test_damaged_attributes_are_restored_from_their_copy(store: Store) -> None:
         opened = Store.open(store.path)
         assert opened.sweep == small_sweep()
         assert opened.status()[Status.DONE] == 15
-        assert opened.repair() == ["zarr.json written anew"]
+        assert opened.repair() == ["zarr.json rewritten"]
         assert root.read_bytes() == sound
         assert opened.repair() == []
 
@@ -174,13 +174,13 @@ def test_array_metadata_that_contradict_the_spec_are_bad_input(store: Store) -> 
         Store.open(store.path)
 
 
-def test_damaged_coordinates_and_array_metadata_are_written_anew(store: Store) -> None:
+def test_damaged_coordinates_and_array_metadata_are_rewritten(store: Store) -> None:
     flip(store.path / "seed" / "c.0", 5)
-    assert store.repair() == ["coordinates written anew"]
+    assert store.repair() == ["coordinates rewritten"]
     (store.path / "P" / "c.0").unlink()
-    assert store.repair() == ["coordinates written anew"]
+    assert store.repair() == ["coordinates rewritten"]
     (store.path / "features" / "zarr.json").write_text("{")
-    assert store.repair() == ["features/zarr.json written anew"]
+    assert store.repair() == ["features/zarr.json rewritten"]
     assert store.repair() == []
 
 

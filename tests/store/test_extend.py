@@ -180,7 +180,7 @@ def test_change_of_metadata_waits_for_others(store: Store, monkeypatch: Any) -> 
     claim = claim_block(store.path, "metadata", 0)
     assert claim is not None
     monkeypatch.setattr("chimera_hpc.store.extend._PATIENCE", 0.1)
-    with pytest.raises(BadInput, match="somebody else keeps changing the store"):
+    with pytest.raises(BadInput, match="another process keeps changing the store"):
         store.adopt(small_sweep("run.workers=3"))
     claim.release()
     assert store.adopt(small_sweep("run.workers=3")).sweep.run.workers == 3

@@ -1,4 +1,4 @@
-"""What a job asks to be made of its points beside the classes: each analysis is one entry.
+"""What a job asks to be made of its points in addition to the classes: each analysis is one entry.
 
 For developers: an analysis is a function in a file of this folder that takes an `AnalysisInput`
 and returns what results.json is to hold of it under ``curves``; and one line in `job.registry`. It

@@ -196,7 +196,7 @@ def most_array_elements() -> int | None:
 
 
 def time_left(job: str) -> float | None:
-    """Return the seconds until a job's time limit; None when it has none, or nobody knows."""
+    """Return the seconds until a job's time limit; None when it has none, or it is unknown."""
     try:
         out = ask("squeue", "-h", "-j", job, "-o", "%L", tries=3)
     except (SlurmFailed, BadInput):

@@ -22,7 +22,7 @@ MODES = ("array", "allocation", "jobqueue")
 WORKERS = 4
 ARRAY = 16
 TIME, MEMORY = "60", "1G"
-"""What is asked for where nobody says otherwise: minutes, and memory of a worker."""
+"""Defaults: minutes, and memory of a worker."""
 LOGS = "slurm"
 """Folder of scripts and logs inside a sweep's folder."""
 _PREFIX = "chimera"
@@ -41,8 +41,8 @@ def job_name(store: Path, what: str = "") -> str:
 def environment_lines() -> list[str]:
     """Return the shell lines that every job begins with.
 
-    One thread a process; compiled kernels in the user's cache folder, apart for each node, where
-    nobody else can write; scratch where the site wants it.
+    One thread per process; compiled kernels in the user's cache folder, apart for each node, where
+    no one else can write; scratch where the site wants it.
     """
     threads = " ".join(f"{name}={value}" for name, value in ONE_THREAD.items())
     node = "${SLURMD_NODENAME:-$(hostname -s)}"
@@ -101,7 +101,7 @@ class Target:
 
 
 def array_script(target: Target, slurm_options: Slurm) -> str:
-    """Return a job array: each element does its share of the blocks, with nobody between."""
+    """Return a job array: each element does its share of the blocks, without a scheduler."""
     n = slurm_options.array or ARRAY
     most = f"%{slurm_options.at_once}" if slurm_options.at_once else ""
     options = [f"--array=0-{n - 1}{most}", "--ntasks=1", f"--mem={slurm_options.mem or MEMORY}"]

@@ -1,4 +1,4 @@
-"""A certificate of its own for each run: whoever reaches a Dask scheduler can run code as its user.
+"""A certificate for each run: any process that reaches a Dask scheduler can run code as its user.
 
 Scheduler, workers and client of a run hold the same certificate, signed by itself, and each asks
 the others for it. It lies in a folder that only the user can read, on the file system that all
