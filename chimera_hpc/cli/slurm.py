@@ -34,10 +34,11 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep slurm jobs/quickstart.toml --mode allocation --workers 64 --submit
 
 array: each element of a job array computes its share, without a scheduler; allocation: driver,
-scheduler and workers in one job; jobqueue: a small job that submits a job for each worker, for sites without
-long programs on login nodes (elsewhere: run JOB.toml --cluster slurm). A sweep begun in one way is
-finished in any other, or with `run` on a laptop. With --submit the store is planned, SLURM is asked
-whether it would take the job (sbatch --test-only), and after an array a second job reduces.
+scheduler and workers in one job; jobqueue: a small job that submits a job for each worker, for
+sites without long programs on login nodes (elsewhere: run JOB.toml --cluster slurm). A sweep begun
+in one way is finished in any other, or with `run` on a laptop. With --submit the store is planned,
+SLURM is asked whether it would take the job (sbatch --test-only), and after an array a second job
+reduces.
 """
 
 
