@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,22 @@ if TYPE_CHECKING:
 
 STORE = "store.zarr"
 _SIZE = re.compile(r"[1-9][0-9]{0,9}([kMGT]i?)?B", re.ASCII)
+
+
+@contextmanager
+def errors_in_one_line(place: Path) -> Iterator[None]:
+    """Raise BadInput for a damaged store, and for a file that cannot be written, at `place`."""
+    try:
+        yield
+    except OSError as error:
+        where = error.filename or place
+        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
+    except RuntimeError as error:
+        from chimera_hpc.store.blocks import DamagedChunk
+
+        if isinstance(error, DamagedChunk):
+            raise BadInput(f"{place}: {error}") from None
+        raise
 
 
 def folder_name(text: str) -> Path:

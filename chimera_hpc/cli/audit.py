@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.processes import usable_cores
-from chimera_hpc.cli.arguments import add, flag, store_path, value
+from chimera_hpc.cli.arguments import add, errors_in_one_line, flag, store_path, value
 
 if TYPE_CHECKING:
     from chimera_hpc.reduction.audit import Sample
@@ -52,16 +52,10 @@ def execute(args: Namespace) -> int:
     folder = store_path(args.folder).parent
     from chimera_hpc.reduction.audit import audit_sweep
     from chimera_hpc.reduction.audit_text import audit_lines
-    from chimera_hpc.store.blocks import DamagedChunk
 
-    try:
+    with errors_in_one_line(args.folder):
         audit = audit_sweep(folder, sample, workers=workers, on_piece=_progress)
         made = [] if args.no_figures else _draw(folder)
-    except DamagedChunk as error:
-        raise BadInput(f"{args.folder}: {error}") from None
-    except OSError as error:
-        where = error.filename or args.folder
-        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
     _print(audit, [] if args.json else [*audit_lines(audit), *made], args.json)
     return Exit.COMPLETE
 

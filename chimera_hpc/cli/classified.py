@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chimera_hpc.base.errors import BadInput
+from chimera_hpc.cli.arguments import errors_in_one_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -168,12 +168,10 @@ def draw(
         )
     _name_nodes(figures, made.names)
     folder = args.out or Path(f"{args.file.name}-classified")
-    try:
+    # The warnings are of letters that the font lacks.
+    with errors_in_one_line(folder), warnings.catch_warnings(action="ignore"):
         folder.mkdir(parents=True, exist_ok=True)
-        with warnings.catch_warnings(action="ignore"):  # of letters that the font lacks
-            return [save(figure, folder / name)[0] for name, figure in figures.items()]
-    except OSError as error:
-        raise BadInput(f"{folder}: can't be written: {error.strerror or error}") from None
+        return [save(figure, folder / name)[0] for name, figure in figures.items()]
 
 
 def _plain(text: str) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add, load_job, store_path, sweep_folder
+from chimera_hpc.cli.arguments import add, errors_in_one_line, load_job, store_path, sweep_folder
 from chimera_hpc.cli.estimate import estimate, refuse_absurd
 
 EPILOG = """examples:
@@ -32,12 +31,9 @@ def execute(args: Namespace) -> int:
     refuse_absurd(sweep, estimate(sweep), folder, args.yes)
     from chimera_hpc.store.store import Store
 
-    try:
+    with errors_in_one_line(path):
         before = Store.open(path)
         after = before.extend(sweep)
-    except OSError as error:
-        where = error.filename or path
-        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
     more = after.n_points - before.n_points
     print(f"{more} points added, {after.n_points} in all, in {after.n_blocks} blocks")
     if more:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
-from chimera_hpc.cli.arguments import STORE, add, flag, store_path
+from chimera_hpc.cli.arguments import STORE, add, errors_in_one_line, flag, store_path
 from chimera_hpc.cli.reporting import reduce_and_report
 from chimera_hpc.store.ledger import read_ledger
 
@@ -30,13 +29,6 @@ def execute(args: Namespace) -> int:
         if left:
             print(f"{folder}: {left} points are left to compute; nothing reduced")
             return Exit.MORE_TO_DO
-    from chimera_hpc.store.blocks import DamagedChunk
-
-    try:
+    with errors_in_one_line(args.folder):
         reduce_and_report(folder, make_figures=not args.no_figures)
-    except DamagedChunk as error:
-        raise BadInput(f"{args.folder}: {error}") from None
-    except OSError as error:
-        where = error.filename or args.folder
-        raise BadInput(f"{where}: can't be written: {error.strerror or error}") from None
     return Exit.COMPLETE

@@ -12,6 +12,7 @@ from chimera_hpc.cli.arguments import (
     STORE,
     add,
     add_slurm,
+    errors_in_one_line,
     executor_of,
     load_job,
     start_early,
@@ -74,7 +75,7 @@ def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
     path = folder / STORE
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder}: not a folder")
-    try:
+    with errors_in_one_line(folder):
         exists = path.exists()
         if not exists:
             refuse_absurd(sweep, estimate(sweep), folder, yes)
@@ -90,5 +91,3 @@ def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
                 raise
             # Another driver planned it in this very moment.
             return Store.open(path).adopt(sweep)
-    except OSError as error:
-        raise BadInput(f"{folder}: can't be written: {error.strerror or error}") from None

@@ -11,7 +11,14 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add, find_points, folder_name, store_path, value
+from chimera_hpc.cli.arguments import (
+    add,
+    errors_in_one_line,
+    find_points,
+    folder_name,
+    store_path,
+    value,
+)
 from chimera_hpc.cli.ending import name_of
 
 if TYPE_CHECKING:
@@ -180,11 +187,9 @@ def _draw(
         data, text = window_spectrum(focus.t, focus.u, settings, node, window)
         print(text)
         figures["spectrum"] = spectrum(data, f"node {node + 1}, window {window + 1}")
-    try:
+    with errors_in_one_line(folder):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]
-    except OSError as error:
-        raise BadInput(f"{folder}: can't be written: {error.strerror or error}") from None
 
 
 def _three(triplet: Any) -> str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.processes import usable_cores
-from chimera_hpc.run.fork_server import ONE_THREAD, signals_blocked, start_fork_server
+from chimera_hpc.run.fork_server import ONE_THREAD, signals_blocked, start_fork_server, start_method
 
 if TYPE_CHECKING:
     from distributed import Client, Scheduler, SpecCluster
@@ -99,8 +99,8 @@ def local_cluster(
             "silence_logs": logging.CRITICAL,
         },
     }
-    method = {"distributed.worker.multiprocessing-method": start_fork_server()}
-    with dask.config.set(settings(patience) | method):
+    method = {"distributed.worker.multiprocessing-method": None}
+    with dask.config.set(settings(patience) | method), start_method(start_fork_server()):
         with signals_blocked():
             cluster = SpecCluster(
                 scheduler={"cls": _calm_scheduler(patience), "options": listening},

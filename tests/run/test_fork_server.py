@@ -48,7 +48,8 @@ assert start_fork_server() == sys.argv[1]
 same = (dict(os.environ), signal.pthread_sigmask(signal.SIG_BLOCK, [])) == before
 with local_cluster(1) as client:
     (found,) = client.run(look).values()
-print(json.dumps(found | {"driver as before": same}))
+same &= multiprocessing.get_start_method(allow_none=True) is None
+print(json.dumps(found | {"driver as before": same, "pandas": "pandas" in sys.modules}))
 """
 linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks into /proc")
 
@@ -82,6 +83,7 @@ def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() ->
     assert forked["loaded"]
     assert forked["numba knows"] > 0
     assert forked["driver as before"]
+    assert not forked["pandas"]  # Dask's own option would import it in the driver
     for found in (forked, spawned):
         assert signal.SIGINT in found["ignored"]
         assert found["blocked"] == []
