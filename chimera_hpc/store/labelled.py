@@ -55,7 +55,10 @@ def open_sweep(path: str | Path) -> xr.Dataset:
 
     store = Store.open(_store_in(Path(path)))
     try:
-        stored = xr.open_zarr(store.path, chunks=None)
+        stored = xr.open_zarr(store.path, chunks={})
+        for name in stored.coords:
+            # A selection needs their values, and xarray indexes by no Dask array.
+            stored.variables[name].load()
     except (ValueError, KeyError, TypeError, OSError):
         # We know better than what the file says: its copy is sound.
         raise BadInput(f"{store.path}: its metadata are damaged; `run` writes them again") from None

@@ -65,3 +65,17 @@ def test_classes_older_than_the_points_are_left_out(store):
     with chimera_hpc.open(store.path) as data:
         assert "class_2" not in data
         assert data.sizes["point"] == 15
+
+
+def test_selecting_and_unstacking_the_whole_dataset_reads_no_series(classified: Store) -> None:
+    for chunk in (classified.path / "u").glob("c.*"):
+        chunk.write_bytes(b"whoever decodes this fails")
+    with chimera_hpc.open(classified.path) as data:
+        grid = data.set_index(point=["cell", "seed"]).unstack()
+        assert grid.V_theta.dims == ("cell", "seed")
+        assert np.isfinite(grid.amplitude.isel(cell=0).values).all()
+        chimeras = data.where(data.class_2 == "chimera", drop=True)
+        assert chimeras.seed.dtype == np.int64
+        assert chimeras.sizes["point"] == 6
+        with pytest.raises(Exception, match=r"."):
+            _ = grid.u.isel(cell=0, seed=0).values
