@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import short
-from chimera_hpc.job import Sweep
+from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.selection import parse_selection
@@ -131,15 +131,24 @@ def find_points(store: Store, words: Sequence[str]) -> list[int]:
 
     Raises BadInput for an unknown name, a value that is none, or when there is no such point.
     """
-    from chimera_hpc.reduction.selection import find_points as find
-
     text = " ".join(words)
     table = parameters_of(store.sweep.model)
     values = parse_selection(text, "point", {p.name: p for p in (*table.parameters, DELTA, SEED)})
-    found = find(store.points, values)
-    if not len(found):
-        raise BadInput(f"point: {short(text)}: there is no such point in {store.path}")
+    found = store.points.find(**values).tolist()
+    if not found:
+        hint = _nearest_values(store.points, values)
+        raise BadInput(f"point: {short(text)}: there is no such point in {store.path}; {hint}")
     return [int(i) for i in found]
+
+
+def _nearest_values(points: Points, values: Mapping[str, int | float]) -> str:
+    """Say which of these values does not occur, and the nearest that does."""
+    for name, value in values.items():
+        if not len(points.find(**{name: value})):
+            # As Python's numbers: integers of 64 bits are subtracted exactly.
+            near = min(points.columns[name].tolist(), key=lambda other: abs(other - value))
+            return f"the nearest {name} is {near}"
+    return "these values do not occur together"
 
 
 def executor_of(args: Namespace, sweep: Sweep, store: Path) -> ExecutorChoice:

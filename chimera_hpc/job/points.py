@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +19,9 @@ MAX_POINTS = 10**8
 
 DTYPES: dict[type, type[np.int64] | type[np.float64]] = {int: np.int64, float: np.float64}
 _MAX_CODE = 2**62
+ULPS = 4
+"""How far a float may be from the one that is meant, in units in the last place: as far as two ways
+to compute the same fraction differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +58,22 @@ class Points:
         return {name: column[i].item() for name, column in self.columns.items()}
 
     def find(self, **values: float) -> NDArray[np.int64]:
-        """Return the indices of the points with these values. Raises BadInput for unknown names."""
-        found = np.ones(len(self), dtype=bool)
-        for name, value in values.items():
-            if name not in self.columns:
-                raise BadInput(f"{name}: no such parameter; known: {', '.join(self.columns)}")
-            found &= self.columns[name] == value
-        return np.flatnonzero(found)
+        """Return the indices of the points with these values, rising.
+
+        Integers are compared exactly, all 64 bits of them. A float means the points that hold it
+        exactly; without such a point, those of the one value within `ULPS` units in the last place.
+
+        Raises
+        ------
+        BadInput
+            For an unknown name, and for a float that is near to several values but equal to none.
+        """
+        if unknown := next((name for name in values if name not in self.columns), None):
+            raise BadInput(f"{unknown}: no such parameter; known: {', '.join(self.columns)}")
+        found = np.arange(len(self))
+        for name in sorted(values, key=lambda name: self.columns[name].dtype.kind == "f"):
+            found = found[_holds(name, self.columns[name][found], values[name])]
+        return found
 
     def cells(self) -> tuple[NDArray[np.int64], dict[str, Column]]:
         """Return the cells: the different combinations of all columns except the seed.
@@ -89,6 +102,24 @@ class Points:
         first.sort()
         cells = {name: column[first] for name, column in self.columns.items() if name != "seed"}
         return rank[number], cells
+
+
+def _holds(name: str, column: Column, value: float) -> NDArray[np.bool_]:
+    """Tell where a column holds a value, as `Points.find` means it."""
+    if column.dtype.kind != "f":
+        # NumPy compares an integer with a Python integer exactly, but with a float as floats.
+        whole = math.isfinite(value) and int(value) == value
+        return np.asarray(column == int(value)) if whole else np.zeros(len(column), dtype=np.bool_)
+    exact: NDArray[np.bool_] = column == value
+    if exact.any():
+        return exact
+    margin = ULPS * math.ulp(value)
+    near: NDArray[np.bool_] = (value - margin <= column) & (column <= value + margin)
+    values = np.unique(column[near]).tolist()
+    if len(values) > 1:
+        text = " and ".join(map(repr, values[:2]))
+        raise BadInput(f"{name}={value!r}: is near to {text}; write all digits of one of them")
+    return near
 
 
 def dependency_order(axes: Mapping[str, Axis]) -> list[str]:

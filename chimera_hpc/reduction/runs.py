@@ -12,7 +12,6 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Cut
 from chimera_hpc.classify.modes import count_votes
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.job.tables import Keep
 from chimera_hpc.plot.figure_input import DrawnRun
 from chimera_hpc.reduction.cells import FreeAxis, describe
@@ -39,7 +38,7 @@ def shown_runs(
     else:
         chosen = []
         for text in selections:
-            i = find_point(store.points, parse_selection(text))
+            i = find_point(store.points, text)
             if i is None:
                 say(f"not shown: {text} is not in this sweep")
             elif not Status(int(status[i])).is_result:

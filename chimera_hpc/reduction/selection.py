@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-from numpy.typing import NDArray
-
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest
 from chimera_hpc.job import Points, Sweep
@@ -27,24 +22,17 @@ def check_selections(sweep: Sweep, points: Points) -> None:
             if name not in points.columns:
                 known = nearest(name, list(points.columns))
                 raise BadInput(f"reduction.show: {text}: this model has no {name}{known}")
+        find_point(points, text)
     for text in sweep.reduction.replay:
         single_point(sweep, points.row(0), text)
 
 
-def find_points(points: Points, values: Mapping[str, int | float]) -> NDArray[np.int64]:
-    """Return the points with these values, as far as nine digits.
-
-    0.015 finds what a linspace made.
-    """
-    fits = np.ones(len(points), dtype=bool)
-    for name, value in values.items():
-        fits &= np.isclose(points.columns[name], value, rtol=1e-9, atol=0.0)
-    return np.flatnonzero(fits)
-
-
-def find_point(points: Points, values: Mapping[str, int | float]) -> int | None:
-    """Return the first point with these values, None when there is none; see `find_points`."""
-    found = find_points(points, values)
+def find_point(points: Points, text: str) -> int | None:
+    """Return the first point that a text of ``reduction.show`` selects, None when there is none."""
+    try:
+        found = points.find(**parse_selection(text, "reduction.show"))
+    except BadInput as error:
+        raise BadInput(f"reduction.show: {text}: {error}") from None
     return int(found[0]) if len(found) else None
 
 

@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.status import Status
+from chimera_hpc.job import Sweep
 from chimera_hpc.store.ledger import FIELDS, point_digest, read_ledger
 from chimera_hpc.store.store import Store
 
@@ -49,6 +51,21 @@ def test_why_tells_status_tries_digest_and_origin_of_one_point(finished: Path, s
     assert "1 try" in out
     assert f"digest {digest:016x}" in out
     assert "run 1, started 20" in out
+
+
+def test_point_of_a_large_seed_is_the_one_that_is_asked_for(tmp_path: Path, sweep: Run) -> None:
+    seeds = [1_700_000_000, 1_700_000_001, 2**62, 2**62 + 1]
+    job = job_text(SMALL, {"grid.P": 3, "grid.seeds": seeds})
+    path = tmp_path / "big" / "store.zarr"
+    Store.plan(path, Sweep.from_toml_text(job))
+    for i, seed in enumerate(seeds):
+        code, out, _ = sweep("why", path.parent, f"seed={seed}")
+        assert (code, out.splitlines()[0]) == (0, f"seed={seed}  (point {i}, block 0)")
+    for absent, near in ((1_700_000_002, 1_700_000_001), (2**62 + 2, 2**62 + 1)):
+        for command in ("why", "show"):
+            code, _, err = sweep(command, path.parent, f"seed={absent}")
+            assert code == 2
+            assert f"there is no such point in {path}; the nearest seed is {near}" in err
 
 
 def test_why_says_that_a_point_never_ran(finished: Path, sweep: Run) -> None:

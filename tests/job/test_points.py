@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import naive
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chimera_hpc.base.errors import BadInput
@@ -73,6 +75,35 @@ def test_index_and_point_belong_together(case, data):
     row = points.row(i)
     assert points.find(**row).tolist() == [i]
     assert points[i : i + 1].row(0) == row
+
+
+BIG = [2**31 + 5, 2**53, 2**53 + 1, 2**62 + 1, 2**63 - 1]
+
+
+@given(st.lists(st.integers(0, 2**63 - 1), min_size=2, max_size=6, unique=True))
+@example([1_700_000_000, 1_700_000_001, 1_700_000_002])
+@example(BIG)
+def test_integers_are_found_by_all_their_bits(seeds):
+    points = sweep({"P": 3, "Q": 0, "seeds": seeds}).points()
+    for i, seed in enumerate(seeds):
+        assert points.find(seed=seed).tolist() == [i]
+        for other in (seed - 1, seed + 1):
+            where = [seeds.index(other)] if other in seeds else []
+            assert points.find(seed=other).tolist() == where
+    assert points.find(seed=10**30).tolist() == points.find(seed=0.5).tolist() == []
+
+
+def test_floats_are_found_exactly_then_within_a_few_units_in_the_last_place():
+    x, ulp = 0.015, math.ulp(0.015)
+    exact = sweep({"P": [3, 4], "Q": 0, "epsilon": [x, x + ulp], "seeds": 1}).points()
+    assert exact.find(epsilon=x).tolist() == [0, 2]
+    assert exact.find(epsilon=x + ulp, P=4).tolist() == [3]
+    with pytest.raises(BadInput, match=r"epsilon=.*: is near to 0.015 and 0.015000000000000001;"):
+        exact.find(epsilon=x - ulp)
+    near = sweep({"P": 3, "Q": 0, "epsilon": [x, 0.02], "seeds": 1}).points()
+    assert near.find(epsilon=x - 4 * ulp).tolist() == [0]
+    assert near.find(epsilon=x - 5 * ulp).tolist() == []
+    assert near.find(epsilon=x * (1 + 1e-9)).tolist() == near.find(epsilon=math.inf).tolist() == []
 
 
 def test_every_parameter_is_a_column_of_its_type():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import build
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
 from chimera_hpc.reduction.reduction import reduce_sweep
-from chimera_hpc.reduction.selection import find_point, single_point
+from chimera_hpc.reduction.selection import check_selections, find_point, single_point
 from chimera_hpc.reduction.table import class_table
 from chimera_hpc.run.initial_state import initial_state
 from chimera_hpc.store.store import Store
@@ -346,10 +347,17 @@ def test_point_that_the_model_does_not_have_is_refused_before_anything_is_writte
 
 def test_point_is_found_by_some_of_its_values():
     points = small_sweep("epsilon={linspace=[0.01,0.1,19]}").points()
-    i = find_point(points, {"P": 3, "epsilon": 0.015, "seed": 2})
+    i = find_point(points, "P=3 epsilon=0.015 seed=2")
     assert points.row(i) | {"P": 3, "seed": 2} == points.row(i)
     assert points.row(i)["epsilon"] == pytest.approx(0.015)
-    assert find_point(points, {"epsilon": 0.0151}) is None
+    assert find_point(points, "epsilon=0.0151") is None
+
+
+def test_selection_that_is_near_to_two_values_is_refused_before_anything_runs():
+    low, high = 0.1 - 3 * math.ulp(0.1), 0.1 + 3 * math.ulp(0.1)
+    sweep = small_sweep(f"epsilon=[{low!r},{high!r}]", 'reduction.show=["P=3 epsilon=0.1"]')
+    with pytest.raises(BadInput, match=r"reduction.show: P=3 epsilon=0.1: .* write all digits"):
+        check_selections(sweep, sweep.points())
 
 
 # Axes

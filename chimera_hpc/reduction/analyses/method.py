@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
-from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.measures.synthetic import profile_error, synthetic_profiles, synthetic_signal
 from chimera_hpc.measures.windows import maxima, windows
@@ -75,7 +74,7 @@ def spectrum(given: AnalysisInput) -> dict[str, Any]:
         raise BadInput("reduction.show names no run")
     assert given.series is not None
     text = selections[min(1, len(selections) - 1)]
-    run = find_point(given.points, parse_selection(text))
+    run = find_point(given.points, text)
     if run is None:
         raise BadInput(f"{text} is not in this sweep")
     t, u = given.series(run)
