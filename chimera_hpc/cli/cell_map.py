@@ -18,7 +18,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.together import points_of
-from chimera_hpc.reduction.cells import FreeAxis, free_axes, number
+from chimera_hpc.reduction.cells import FreeAxis, free_axes
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -161,7 +161,7 @@ def _append(text: Text, mark: Mark, plain: bool, width: int = 1) -> None:
 def _strip(text: Text, axis: FreeAxis, marks: Sequence[Mark], width: int, plain: bool) -> None:
     """Append cells along one axis in as many lines as they need, each with its first value."""
     order = np.argsort(axis.values, kind="stable").tolist()
-    heads = [number(axis.values[i]) for i in order]
+    heads = [axis.label(axis.values[i]) for i in order]
     margin = max(map(len, heads)) + 1
     across = 2 if 2 * len(order) + margin <= width else 1
     length = max(1, (width - margin) // across)
@@ -185,7 +185,7 @@ def _maps(
     for key in different[:_MOST_MAPS]:
         chosen = [i for i, k in enumerate(keys) if k == key]
         if others:
-            parts = [f"{axis.plain} = {number(v)}" for axis, v in zip(others, key, strict=True)]
+            parts = [f"{axis.plain} = {axis.label(v)}" for axis, v in zip(others, key, strict=True)]
             text.append(", ".join(parts) + "\n", style="bold")
         _map(text, cells.axes[0], cells.axes[1], chosen, marks, width, height, plain)
     if len(different) > _MOST_MAPS:
@@ -204,7 +204,7 @@ def _map(
 ) -> None:
     """Append one map, the second axis upwards."""
     x, y = np.unique(across.values).tolist(), np.unique(up.values).tolist()
-    margin = max(len(up.plain), *(len(number(value)) for value in y)) + 1
+    margin = max(len(up.plain), *(len(up.label(value)) for value in y)) + 1
     room = max(1, width - margin)
     size = next((k for k in (3, 2, 1) if k * len(x) <= room), 1)
     fold_x, fold_y = -(-len(x) // (room // size)), -(-len(y) // max(4, height))
@@ -215,14 +215,14 @@ def _map(
         grid[place] = min(marks[i], grid.get(place, marks[i]), key=_rank)
     text.append(f"{up.plain}\n", style="bold")
     for line in reversed(range(-(-len(y) // fold_y))):
-        text.append(number(y[line * fold_y]).rjust(margin - 1) + " ")
+        text.append(up.label(y[line * fold_y]).rjust(margin - 1) + " ")
         for k in range(-(-len(x) // fold_x)):
             if (k, line) in grid:
                 _append(text, grid[k, line], plain, size)
             else:
                 text.append(" " * size)
         text.append("\n")
-    text.append(" " * margin + _heads([number(v) for v in x[::fold_x]], size, room))
+    text.append(" " * margin + _heads([across.label(v) for v in x[::fold_x]], size, room))
     text.append(f"  {across.plain}\n", style="bold")
     if fold_x * fold_y > 1:
         text.append(f"each sign stands for {fold_x} by {fold_y} cells, the worst of them\n")

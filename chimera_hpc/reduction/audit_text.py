@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from chimera_hpc.classify.resampling import FIRM
-from chimera_hpc.reduction.cells import number
 
 HEAD = (
     *("computed again with", "labels changed", "95 % interval"),
@@ -89,4 +88,4 @@ def bootstrap_lines(audit: Audit) -> list[str]:
 
 def place_words(place: Mapping[str, float]) -> str:
     """Return where a point or a cell lies: ``P = 9, Q = 3``; the only cell has no place."""
-    return ", ".join(f"{name} = {number(value)}" for name, value in place.items()) or "all"
+    return ", ".join(f"{name} = {value}" for name, value in place.items()) or "all"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,8 @@ SYMBOLS = {
 """How parameters are written in figures, where it is not their name."""
 
 
-class FreeAxis(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class FreeAxis:
     """Parameters that vary together, such as P and Q where Q = P, and their value in each cell."""
 
     names: tuple[str, ...]
@@ -34,6 +37,17 @@ class FreeAxis(NamedTuple):
     def symbol(self) -> str:
         """The axis in a figure: ``$P = Q$``."""
         return f"${' = '.join(map(_symbol, self.names))}$"
+
+    @cached_property
+    def digits(self) -> int:
+        """Fewest significant digits, four or more, with which no two values look alike."""
+        values = np.unique(self.values).tolist()
+        enough = (k for k in range(4, 17) if len({number(x, k) for x in values}) == len(values))
+        return next(enough, 17)
+
+    def label(self, value: float) -> str:
+        """Write one of the axis' values for people."""
+        return number(value, self.digits)
 
 
 def free_axes(cells: Mapping[str, NDArray[Any]], axes: Sequence[str]) -> list[FreeAxis]:
@@ -62,16 +76,16 @@ def describe(row: Mapping[str, int | float], axes: Sequence[FreeAxis], math: boo
     for axis in axes:
         equal = len({row[name] for name in axis.names}) == 1
         for names in [axis.names] if equal else [(name,) for name in axis.names]:
-            value = number(row[names[0]])
+            value = axis.label(row[names[0]])
             words = [_symbol(name) if math else name for name in names]
             text = " = ".join([*words, value])
             parts.append(f"${text}$" if math else text)
     return ", ".join(parts)
 
 
-def number(value: float) -> str:
-    """Write a parameter for people: integers as they are, others in four digits."""
-    return str(value) if isinstance(value, int | np.integer) else f"{value:.4g}"
+def number(value: float, digits: int = 4) -> str:
+    """Write a parameter for people: integers as they are, others in so many digits."""
+    return str(value) if isinstance(value, int | np.integer) else f"{value:.{digits}g}"
 
 
 def _count(columns: Sequence[NDArray[Any]]) -> int:

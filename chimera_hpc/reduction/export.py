@@ -36,8 +36,9 @@ def to_csv(store: Store, target: Path, series: bool = False) -> None:
 def to_netcdf(store: Store, target: Path, series: bool = False) -> None:
     """Write features, scalars and ledger as NetCDF; the series too if `series`.
 
-    NetCDF 4 where a library for it is there. NetCDF 3, which SciPy writes, has no 64-bit integers:
-    digests are texts of 16 hexadecimal digits there, and other large numbers are floats.
+    NetCDF 4 where a library for it is there. NetCDF 3, which SciPy writes, has no 64-bit integers.
+    Integers that need more than 32 bits are floats there, which hold 53 bits exactly; those that
+    need still more are texts of decimal digits, and digests are texts of 16 hexadecimal digits.
     """
     dataset = open_sweep(store.path)
     if not series:
@@ -121,13 +122,15 @@ def _files(store: Store, folder: Path) -> Iterator[Path]:
 def _without_large_integers(dataset: xr.Dataset) -> None:
     for name, variable in dataset.variables.items():
         values = variable.values if variable.dtype == np.int64 else np.zeros(0, np.int64)
-        if not (np.abs(values.astype(np.float64)) >= 2**31).any():
+        largest = max(abs(int(values.max(initial=0))), abs(int(values.min(initial=0))))
+        if largest < 2**31:
             continue
+        new: NDArray[Any] = values.astype(np.float64)
         if name == "digest":
-            texts = np.array([f"{value & (2**64 - 1):016x}" for value in values.tolist()])
-            dataset["digest"] = (variable.dims, texts, variable.attrs)
-        else:
-            dataset[name] = (variable.dims, values.astype(np.float64), variable.attrs)
+            new = np.array([f"{value & (2**64 - 1):016x}" for value in values.tolist()])
+        elif largest > 2**53:
+            new = values.astype(np.str_)
+        dataset[name] = (variable.dims, new, variable.attrs)
 
 
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "dtype")

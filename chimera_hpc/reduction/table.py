@@ -10,7 +10,7 @@ import numpy as np
 
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY
 from chimera_hpc.classify.naming import CLASSES
-from chimera_hpc.reduction.cells import FreeAxis, number
+from chimera_hpc.reduction.cells import FreeAxis
 
 Cells = Sequence[Mapping[str, Any]]
 
@@ -40,7 +40,7 @@ def class_table(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
 
 
 def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
-    columns = [[axis.plain, *map(number, axis.values)] for axis in axes]
+    columns = [[axis.plain, *map(axis.label, axis.values)] for axis in axes]
     for i, (cut, cells) in enumerate(cuts.items()):
         columns.append([f"{cut} clusters", *(cell["class"] or _NOTHING for cell in cells)])
         if i == 0:
@@ -67,7 +67,7 @@ def _ranges(cells: Cells, axis: FreeAxis) -> str:
         name = cells[i]["class"] or _NOTHING
         if name != last:
             stretches.setdefault(name, []).append([])
-        stretches[name][-1].append(number(axis.values[i]))
+        stretches[name][-1].append(axis.label(axis.values[i]))
         last = name
     width = max(map(len, stretches))
     return "\n".join(
@@ -82,7 +82,7 @@ def _map(cells: Cells, across: FreeAxis, up: FreeAxis) -> str:
     x, column = np.unique(across.values, return_inverse=True)
     y, row = np.unique(up.values, return_inverse=True)
     letters = _letters(_in_order({cell["class"] for cell in cells if cell["class"]}))
-    heads, sides = [number(value) for value in x], [number(value) for value in y]
+    heads, sides = [across.label(value) for value in x], [up.label(value) for value in y]
     width = 1 + max(map(len, heads))
     margin = max(map(len, [*sides, up.plain]))
     if len(y) > MOST_LINES or margin + width * len(x) > WIDTH:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
-from chimera_hpc.reduction.cells import number
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import looks_of
 from chimera_hpc.report.pictures import Plates, rounded
@@ -43,9 +42,16 @@ def thinned(values: NDArray[np.int64], most: int) -> NDArray[np.int64]:
     return values[np.linspace(0, len(values) - 1, most).round().astype(np.int64)]
 
 
+def exact(values: NDArray[Any]) -> list[int] | list[str]:
+    """Return integers for the page's script: as texts where one is beyond a double's 53 bits."""
+    numbers: list[int] = values.tolist()
+    large = max(map(abs, numbers), default=0) > 2**53
+    return [str(value) for value in numbers] if large else numbers
+
+
 def axis_labels(content: Content) -> list[tuple[str, list[str]]]:
     """Return name and labels of the rising values of each free axis; a single one at least."""
-    named = [(axis.plain, [number(v) for v in np.unique(axis.values)]) for axis in content.axes]
+    named = [(axis.plain, [axis.label(v) for v in np.unique(axis.values)]) for axis in content.axes]
     return named or [("all runs", ["1"])]
 
 
@@ -59,7 +65,7 @@ def payload(content: Content, shown: Shown, plates: Plates, top: TreeTop) -> dic
         "cells": _cells(content, shown),
         "points": {
             "row": row_of[content.cell[shown.points]].tolist(),
-            "seed": content.store.points.columns["seed"][shown.points].tolist(),
+            "seed": exact(content.store.points.columns["seed"][shown.points]),
             **{
                 name: [rounded(v) for v in content.triplets[shown.points, k].tolist()]
                 for k, name in enumerate(("V_theta", "V_a", "V_Omega"))

@@ -183,7 +183,6 @@ def _profiles_of(content: Content, points: NDArray[np.int64]) -> dict[int, Array
 def _plate(content: Content, i: int, features: Array | None) -> dict[str, Any]:
     plate: dict[str, Any] = {
         "point": content.point_words(i),
-        "seed": int(content.store.points.columns["seed"][i]),
         "status": Status(int(content.status[i])).sentence,
         "classes": {str(k): int(cut.labels[i]) for k, cut in content.cuts.items()},
     }

@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 from jobs_for_tests import SMALL, job_text
 
+import chimera_hpc
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.store.ledger import FIELDS, point_digest, read_ledger
@@ -370,6 +371,22 @@ def test_netcdf_holds_what_the_store_does(
     assert sweep("export", finished, "--to", target)[0] == 0
     with xr.open_dataset(target) as dataset:
         assert "u" not in dataset
+
+
+def test_seeds_of_64_bits_are_exported_with_all_their_bits(tmp_path: Path, sweep: Run) -> None:
+    for seeds in ([3, 2**31 + 1, 2**53 - 1], [0, 2**53 + 1, 2**63 - 1]):
+        folder = tmp_path / str(seeds[1])
+        job = job_text(SMALL, {"grid.P": 3, "grid.seeds": seeds})
+        Store.plan(folder / "store.zarr", Sweep.from_toml_text(job))
+        for name in ("sweep.nc", "table.csv"):
+            assert sweep("export", folder, "--to", folder / name)[0] == 0
+        with xr.open_dataset(folder / "sweep.nc") as dataset:
+            assert [int(seed) for seed in dataset["seed"].values] == seeds
+        with (folder / "table.csv").open() as file:
+            assert [int(row["seed"]) for row in csv.DictReader(file)] == seeds
+        with xr.open_zarr(folder / "store.zarr") as dataset:
+            assert dataset["seed"].values.tolist() == seeds
+        assert chimera_hpc.open(folder).seed.values.tolist() == seeds
 
 
 def test_bundle_holds_job_provenance_and_results(

@@ -40,6 +40,15 @@ def test_steady_votes_count_as_ordered_and_ties_go_to_the_larger_class() -> None
     assert family_of({"no_window": 3}, size) is None
 
 
+def test_a_selection_takes_integers_exactly_and_fractions_within_a_few_ulps() -> None:
+    rows = [{"seed": 2**62}, {"seed": 2**62 + 1}]
+    assert select(rows, {"seed": 2**62 + 1}) == rows[1:]
+    with pytest.raises(Missing):
+        select(rows, {"seed": 2**62 + 2})
+    fractions = [{"b": 0.1 + 0.2}, {"b": 0.3 + 1e-9}]
+    assert select(fractions, {"b": 0.3}) == fractions[:1]
+
+
 def test_a_selection_of_an_absent_value_is_missing() -> None:
     rows = [{"P": 3, "epsilon": 0.1}, {"P": 4, "epsilon": 0.2}]
     assert wanted("3:5") == [3, 4, 5]

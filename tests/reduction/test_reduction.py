@@ -363,6 +363,15 @@ def test_selection_that_is_near_to_two_values_is_refused_before_anything_runs():
 # Axes
 
 
+def test_values_that_differ_have_labels_that_differ():
+    close = FreeAxis(("epsilon",), np.array([0.1, 0.10001, 0.2]))
+    assert [close.label(x) for x in close.values] == ["0.1", "0.10001", "0.2"]
+    nearer = FreeAxis(("epsilon",), np.array([0.1, 0.1 + math.ulp(0.1)]))
+    assert len({nearer.label(x) for x in nearer.values}) == 2
+    assert FreeAxis(("epsilon",), np.array([1 / 3, 2 / 3])).label(1 / 3) == "0.3333"
+    assert describe({"epsilon": 0.10001}, [close]) == "epsilon = 0.10001"
+
+
 def test_columns_that_vary_together_are_one_axis():
     cells = {"P": np.array([2, 3, 4]), "Q": np.array([2, 3, 4]), "b": np.full(3, 0.5)}
     (axis,) = free_axes(cells, ("P", "Q", "b"))

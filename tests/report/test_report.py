@@ -49,6 +49,14 @@ def words_of(page: str) -> str:
     return " ".join(text.split())
 
 
+def test_seeds_reach_the_pages_script_with_all_their_bits(tmp_path, filled):
+    seeds = [2**53 - 1, 2**53 + 1, 2**63 - 1]
+    filled(tmp_path, f"seeds={seeds}", FAST)
+    # A browser reads a number of JSON as a double.
+    numbers = json.loads(json.dumps(data_of(page_of(tmp_path))), parse_int=float)
+    assert {int(seed) for seed in numbers["points"]["seed"]} == set(seeds)
+
+
 def test_one_file_beside_the_store_that_names_nothing_to_load(tmp_path, filled):
     filled(tmp_path, FAST)
     page = page_of(tmp_path)

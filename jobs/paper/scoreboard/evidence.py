@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from math import ulp
 from pathlib import Path
 from typing import Any
 
+from chimera_hpc.job.points import ULPS
 from chimera_hpc.reduction.results import read_results
 
 Cell = Mapping[str, Any]
@@ -98,7 +100,9 @@ def select(cells: Sequence[Cell], where: Mapping[str, Any]) -> list[Cell]:
             continue
         kept: list[Cell] = []
         for one in wanted(value):
-            those = [c for c in found if abs(c[name] - one) <= 1e-9 * max(1.0, abs(one))]
+            margin = ULPS * ulp(one) if isinstance(one, float) else 0
+            those = [c for c in found if c[name] == one]
+            those = those or [c for c in found if abs(c[name] - one) <= margin]
             if not those:
                 raise Missing(f"no cell with {name} = {one}")
             kept.extend(those)
