@@ -150,7 +150,8 @@ def store_arrays() -> str:
         for plan in plans
     ]
     parts = [_table(("array", "dimensions", "type", "chunk", "what"), rows)]
-    for name, dimension in (("features", "feature"), ("scalars", "quantity"), ("ledger", "field")):
+    labelled = {"features": "feature", "scalars": "quantity", "quality": "mark", "ledger": "field"}
+    for name, dimension in labelled.items():
         attributes = named[name].attributes
         labels = zip(attributes["labels"], attributes["label_units"], strict=True)
         words = ", ".join(f"`{label}`" + (f" ({u})" if u != "1" else "") for label, u in labels)

@@ -196,7 +196,8 @@ def modal_class(votes_of_runs, members):
     """
     oscillating = [name for name in votes_of_runs if name in members]
     if not oscillating:
-        return "steady" if any(votes_of_runs) else None
+        steady, slow = votes_of_runs.count("steady"), votes_of_runs.count("no_window")
+        return ("steady" if steady > slow else "no_window") if steady + slow else None
     best = None
     for name in members:
         more = best is None or oscillating.count(name) > oscillating.count(best)

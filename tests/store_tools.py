@@ -42,6 +42,7 @@ class Result:
     status: NDArray[np.int64]
     features: NDArray[np.float64]
     scalars: NDArray[np.float64]
+    quality: NDArray[np.float64]
     steps: NDArray[np.int64]
     elapsed_us: NDArray[np.int64]
     n_windows: NDArray[np.int64]
@@ -57,13 +58,14 @@ def results(store: Store, points: Any, status: Status = Status.DONE) -> Result:
     """Return results of points that depend on what each point is, and on nothing else."""
     sweep, columns = store.sweep, store.points.columns
     points = np.atleast_1d(points)
-    features, scalars, series = [], [], []
+    features, scalars, series, quality = [], [], [], []
     for point in points:
         key = [int(columns[name][point]) for name in ("P", "Q", "seed")]
         rng = np.random.default_rng(key)
         features.append(rng.normal(size=(8, sweep.n_nodes)))
         scalars.append(rng.normal(size=len(scalar_labels(sweep))))
         series.append(rng.uniform(-3, 3, size=(sweep.n_samples, sweep.n_nodes)))
+        quality.append(rng.uniform([30.0, 0.6], [50.0, 1.0]))
     n = len(points)
     u = np.array(series)
     u[~series_mask(sweep, columns["seed"][points])] = np.nan
@@ -71,13 +73,15 @@ def results(store: Store, points: Any, status: Status = Status.DONE) -> Result:
         np.full(n, status),
         np.array(features),
         np.array(scalars),
+        np.array(quality),
         points * 10,
         points * 100,
         np.full(n, 3),
         None if sweep.keep.series == "none" else encode_series(u, sweep.keep.dtype),
     )
     if not status.is_result:
-        made.features[:] = made.scalars[:] = np.nan
+        made.features[:] = np.nan
+        made.scalars[:] = made.quality[:] = np.nan
     return made
 
 

@@ -24,13 +24,15 @@ class CellTable(Protocol):
 
 
 def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[str, Any]]:
-    """Describe each cell by its coordinates and by ``class``, ``votes`` and ``entropy_bits``.
+    """Describe each cell by its coordinates and by its modal class.
 
-    Every run with a result has one vote: its class, ``steady``, or ``no_window`` (it varies, but
-    too slowly to be classified). The modal class is taken over the classified runs. Ties go to the
-    class with more members in the whole cut, then to the first in its order. A cell whose runs are
-    all steady or without a window is ``steady``. A cell without a result has class None and no
-    votes. The entropy -sum p log2 p is that of the votes.
+    The other keys are ``class``, ``oscillating``, ``votes`` and ``entropy_bits``. Every run with a
+    result has one vote: its class, ``steady``, or ``no_window`` (it varies, but too slowly or too
+    coarsely sampled to be classified). The modal class is taken over the runs that oscillate, and
+    ``oscillating`` is their share among the votes. Ties go to the class with more members in the
+    whole cut, then to the first in its order. A cell without an oscillating run is ``steady`` if
+    most of its runs are, else ``no_window``. A cell without a result has class None, share None and
+    no votes. The entropy -sum p log2 p is that of the votes.
     """
     cell_of_point, columns = points.cells()
     n_cells = max((len(column) for column in columns.values()), default=0)
@@ -38,11 +40,13 @@ def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[s
     votes = count_votes(cell_of_point, vote_labels(cut.labels, status, len(cut.names)), n_cells)
     votes = np.pad(votes, ((0, 0), (0, len(names) - votes.shape[1])))
     modal = modal_votes(votes, cut.sizes)
+    shares = votes[:, : len(cut.names)].sum(axis=1) / np.maximum(votes.sum(axis=1), 1)
     entropy = entropy_bits(votes)
     found = []
     for i in range(n_cells):
         cell: dict[str, Any] = {name: column[i].item() for name, column in columns.items()}
         cell["class"] = names[modal[i]] if modal[i] >= 0 else None
+        cell["oscillating"] = float(shares[i]) if modal[i] >= 0 else None
         cell["votes"] = {names[j]: int(votes[i, j]) for j in np.flatnonzero(votes[i])}
         cell["entropy_bits"] = float(entropy[i])
         found.append(cell)
@@ -82,12 +86,13 @@ def modal_votes(votes: Integers, sizes: Integers) -> Integers:
     """Return the modal class of each row of `votes` (n, k + 2), whose last columns are no classes.
 
     The last two columns count steady runs and runs without a window. They decide only if no run
-    has a class: the result is then k (steady). It is -1 for an empty row. `sizes` (k,) decides
-    ties, see `modal_labels`.
+    has a class: the result is then k (steady) if more runs are steady, else k + 1 (no window). It
+    is -1 for an empty row. `sizes` (k,) decides ties, see `modal_labels`.
     """
-    modal = modal_labels(votes[:, : len(sizes)], sizes)
-    silent = np.where(votes.any(axis=1), len(sizes), -1)
-    return np.where(modal >= 0, modal, silent)
+    k = len(sizes)
+    modal = modal_labels(votes[:, :k], sizes)
+    silent = np.where(votes[:, k] > votes[:, k + 1], k, k + 1)
+    return np.where(modal >= 0, modal, np.where(votes.any(axis=1), silent, -1))
 
 
 def entropy_bits(votes: Integers) -> Floats:

@@ -8,7 +8,11 @@ It is found in three steps. (1) Find the largest line of the amplitude spectrum 
 y - <y>, without padding, taper or bin 0. (2) Omega is the vertex of the parabola through this line
 and its neighbours. (3) Fit p1 cos(2 pi Omega t + p2) + p3 by least squares with Omega fixed, a
 problem that is linear in (p1 cos p2, p1 sin p2, p3). The features are mean and standard deviation
-over the windows (eq:averages, eq:stds).
+over the windows (eq:averages, eq:stds). The share of the signal's energy that the fit explains,
+
+    R^2 = 1 - sum_i (y_i - fit_i)^2 / sum_i (y_i - <y>)^2 ,
+
+tells how far a signal is a sine: 1 for a sine, 0 for white noise.
 """
 
 from __future__ import annotations
@@ -26,7 +30,8 @@ from chimera_hpc.base.renaming import accepts_old_names
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
-from chimera_hpc.measures.checks import Array, choice, floats, integer, node_rows
+from chimera_hpc.measures.checks import Array, choice
+from chimera_hpc.measures.recording import check_node, check_threshold, check_windows, recording
 
 WindowReference = Literal["ring", "own"]
 PhaseMean = Literal["circular", "arithmetic"]
@@ -36,10 +41,10 @@ TimeOrigin = Literal["window", "absolute"]
 QUANTITIES = ("amplitude", "frequency", "phase", "baseline")
 FEATURES = (*QUANTITIES, *(f"{name}_std" for name in QUANTITIES))
 
+# What a kernel writes of each window.
+_COLUMNS = (*QUANTITIES, "r_squared")
 _PHASE = QUANTITIES.index("phase")
 _FREQUENCY = QUANTITIES.index("frequency")
-# Largest distance of a time from the uniform grid, in steps.
-_UNIFORM = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +63,7 @@ class FourierFeatures:
     frequency_std: Array
     phase_std: Array  # rad
     baseline_std: Array
+    r_squared: Array  # of the fit, mean over the windows; NaN for a constant signal
     n_windows: int  # of each signal; with window_reference "own", the minimum over the signals
     deviation: float  # mean over the signals of the standard deviation in time
     status: Status  # DONE, STEADY or NO_WINDOW
@@ -71,30 +77,22 @@ class FourierFeatures:
 class WindowLines:
     """The lines of N signals in each of up to q windows, before averaging.
 
-    `amplitude`, `frequency`, `phase` and `baseline` have shape (N, q). `first` and `last` (samples,
-    both inside the window) and `counts` have one row per reference signal: 1 for window_reference
-    "ring", N for "own". After a row's count, values are NaN and samples 0. All fields except
-    `deviation` are empty unless `status` is DONE.
+    `amplitude`, `frequency`, `phase`, `baseline` and `r_squared` have shape (N, q). `first` and
+    `last` (samples, both inside the window) and `counts` have one row per reference signal: 1 for
+    window_reference "ring", N for "own". After a row's count, values are NaN and samples 0. All
+    fields except `deviation` are empty unless `status` is DONE.
     """
 
     amplitude: Array
     frequency: Array
     phase: Array
     baseline: Array
+    r_squared: Array
     first: windows.Samples
     last: windows.Samples
     counts: windows.Samples
     deviation: float  # mean over the signals of the standard deviation in time
     status: Status
-
-
-@dataclass(frozen=True)
-class _Recording:
-    """Checked input: N signals in rows (N, T), sampled at t[0] + dt * (0 .. T-1)."""
-
-    t: Array
-    dt: float
-    x: Array
 
 
 @accepts_old_names(renaming.FEATURES)
@@ -184,13 +182,13 @@ def fourier_features(
         time_origin=time_origin,
         steady_threshold=steady_threshold,
     )
-    out = np.full((len(FEATURES), found.amplitude.shape[0]), np.nan)
+    out = np.full((len(FEATURES) + 1, found.amplitude.shape[0]), np.nan)
     n_windows = 0
     if found.status is Status.DONE:
         n_windows = int(found.counts.min())
-        values = np.stack([getattr(found, name) for name in QUANTITIES])
+        values = np.stack([getattr(found, name) for name in _COLUMNS])
         _average(values, found.counts, phase_mean == "circular", out)
-    rows = dict(zip(FEATURES, out, strict=True))
+    rows = dict(zip((*FEATURES, "r_squared"), out, strict=True))
     return FourierFeatures(
         **rows, n_windows=n_windows, deviation=found.deviation, status=found.status
     )
@@ -210,35 +208,35 @@ def window_lines(
     steady_threshold: float = 1e-2,
 ) -> WindowLines:
     """Lines of all signals in all windows. Parameters and errors as in `fourier_features`."""
-    recording = _recording(t, u)
-    n_nodes = recording.x.shape[0]
-    n_peaks, n_overlap = _check_windows(n_peaks, n_overlap)
-    reference_node = _check_node(reference_node, n_nodes)
+    given = recording(t, u)
+    n_nodes = given.x.shape[0]
+    n_peaks, n_overlap = check_windows(n_peaks, n_overlap)
+    reference_node = check_node(reference_node, n_nodes)
     choice("window_reference", window_reference, get_args(WindowReference))
     choice("refine", refine, get_args(Refine))
     choice("time_origin", time_origin, get_args(TimeOrigin))
-    _check_threshold(steady_threshold)
+    check_threshold(steady_threshold)
 
-    deviation = _mean_deviation(recording.x)
+    deviation = _mean_deviation(given.x)
     if deviation < steady_threshold:
         return _no_lines(n_nodes, deviation, Status.STEADY)
     own = window_reference == "own"
-    placing = recording.x if own else recording.x[reference_node : reference_node + 1]
+    placing = given.x if own else given.x[reference_node : reference_node + 1]
     first, last, counts = _place_windows(placing, n_peaks, n_overlap)
     if counts.min() == 0:
         return _no_lines(n_nodes, deviation, Status.NO_WINDOW)
-    table = np.full((n_nodes, first.shape[1], len(QUANTITIES)), np.nan)
+    table = np.full((n_nodes, first.shape[1], len(_COLUMNS)), np.nan)
     work = lines.work_arrays(int((last - first).max()) + 1)
     bins = np.full(n_nodes, n_peaks - 1)
-    _fill_lines(recording.x, first, last, counts, bins, refine == "sine-fit", work, table)
+    _fill_lines(given.x, first, last, counts, bins, refine == "sine-fit", work, table)
     values = np.ascontiguousarray(table.transpose(2, 0, 1))
-    values[_FREQUENCY] /= 2.0 * np.pi * recording.dt
+    values[_FREQUENCY] /= 2.0 * np.pi * given.dt
     if time_origin == "absolute":
-        values[_PHASE] -= 2.0 * np.pi * values[_FREQUENCY] * recording.t[first]
+        values[_PHASE] -= 2.0 * np.pi * values[_FREQUENCY] * given.t[first]
     values[_PHASE] = wrap(values[_PHASE])
-    amplitude, frequency, phase, baseline = values
+    columns = dict(zip(_COLUMNS, values, strict=True))
     return WindowLines(
-        amplitude, frequency, phase, baseline, first, last, counts, deviation, Status.DONE
+        **columns, first=first, last=last, counts=counts, deviation=deviation, status=Status.DONE
     )
 
 
@@ -252,7 +250,14 @@ def _no_lines(n_nodes: int, deviation: float, status: Status) -> WindowLines:
     none = np.empty((n_nodes, 0))
     samples = np.empty((1, 0), dtype=np.int64)
     counts = np.zeros(1, dtype=np.int64)
-    return WindowLines(none, none, none, none, samples, samples, counts, deviation, status)
+    return WindowLines(
+        **dict.fromkeys(_COLUMNS, none),
+        first=samples,
+        last=samples,
+        counts=counts,
+        deviation=deviation,
+        status=status,
+    )
 
 
 def _place_windows(
@@ -281,7 +286,7 @@ def _deviations(x: Any, work: Any, out: Any) -> None:
 def _fill_lines(
     x: Any, first: Any, last: Any, counts: Any, bins: Any, refine: bool, work: Any, values: Any
 ) -> None:
-    """Write the lines of each row of x (N, T) in its windows into values (N, q, 4).
+    """Write the lines of each row of x (N, T) in its windows into values (N, q, 5).
 
     Frequencies are angles per sample. Phases are at the first sample, not wrapped. bins (N,) holds
     a guess for the dominant bin of each row and is updated to its bin in the last window.
@@ -299,7 +304,10 @@ def _fill_lines(
 
 @jit()
 def _average(values: Any, counts: Any, circular: bool, out: Any) -> None:
-    """Write means and standard deviations over windows of values (4, N, q) into out (8, N)."""
+    """Write means and standard deviations over windows of values (5, N, q) into out (9, N).
+
+    Of the last row, R^2, only the mean.
+    """
     for j in range(values.shape[1]):
         q = counts[j % counts.size]
         for row in range(4):
@@ -314,6 +322,7 @@ def _average(values: Any, counts: Any, circular: bool, out: Any) -> None:
                 square += deviation * deviation
             out[row, j] = mean
             out[row + 4, j] = math.sqrt(square / (q - 1)) if q > 1 else math.nan
+        out[8, j] = _mean(values[4, j, :q])
 
 
 @jit()
@@ -338,24 +347,6 @@ def _circular_mean(x: Any) -> float:
     return mean if mean < math.pi else -math.pi
 
 
-def _recording(t: ArrayLike, u: ArrayLike) -> _Recording:
-    times, rows = floats("t", t), node_rows("u", u)
-    n_times = rows.shape[1]
-    if times.shape != (n_times,):
-        raise BadInput(f"t must have shape ({n_times},), one time a row of u, not {times.shape}")
-    if n_times < 3:
-        raise BadInput(f"t must hold at least 3 times, not {n_times}")
-    dt = float(times[-1] - times[0]) / (n_times - 1)
-    if not (math.isfinite(dt) and dt > 0):
-        raise BadInput(f"t must be finite and rise, from t[0] = {times[0]} to t[-1] = {times[-1]}")
-    departure = np.abs(times - (times[0] + dt * np.arange(n_times))).max() / dt
-    if not departure <= _UNIFORM:
-        raise BadInput(
-            f"t must be uniform: a time is {departure:.3g} steps off, allowed is {_UNIFORM:g}"
-        )
-    return _Recording(times, dt, rows)
-
-
 def _mean_deviation(x: Array) -> float:
     """Return the mean over signals of the standard deviation in time; BadInput if not finite."""
     deviations = np.empty(x.shape[0])
@@ -364,27 +355,6 @@ def _mean_deviation(x: Array) -> float:
         node = int(np.flatnonzero(~np.isfinite(deviations))[0])
         raise BadInput(f"u must be finite, its squares too: node {node} (column of u) is not")
     return float(deviations.mean())
-
-
-def _check_windows(n_peaks: int, n_overlap: int) -> tuple[int, int]:
-    n_peaks, n_overlap = integer("n_peaks", n_peaks), integer("n_overlap", n_overlap)
-    if n_peaks < 3:
-        raise BadInput(f"n_peaks must be at least 3, not {n_peaks}")
-    if not 0 <= n_overlap < n_peaks:
-        raise BadInput(f"n_overlap must be in 0 .. n_peaks - 1 = {n_peaks - 1}, not {n_overlap}")
-    return n_peaks, n_overlap
-
-
-def _check_node(reference_node: int, n_nodes: int) -> int:
-    reference_node = integer("reference_node", reference_node)
-    if not 0 <= reference_node < n_nodes:
-        raise BadInput(f"reference_node must be in 0 .. {n_nodes - 1}, not {reference_node}")
-    return reference_node
-
-
-def _check_threshold(threshold: float) -> None:
-    if not 0.0 <= threshold < math.inf:
-        raise BadInput(f"steady_threshold must be a finite number >= 0, not {threshold}")
 
 
 assert tuple(f.name for f in fields(FourierFeatures))[: len(FEATURES)] == FEATURES

@@ -359,21 +359,22 @@ def sine_fit(z, z_s, n, energy, w, turn):
 
 @jit()
 def window_line(x, first, n, guess, refine: bool, work, out):
-    """Write amplitude, angular frequency per sample, phase and baseline into out (4,).
+    """Write amplitude, angular frequency per sample, phase, baseline and R^2 into out (5,).
 
     The phase is at the first sample. If all samples are equal, amplitude, frequency and phase are
-    0. Returns the dominant bin, which is a good guess for the next window.
+    0, and R^2 is NaN. Returns the dominant bin, which is a good guess for the next window.
     """
     z, z_s, power, turn, sums = work
     mean, energy, alternating = centre(x, first, n, z, sums)
     if energy == 0.0:
-        out[0], out[1], out[2], out[3] = 0.0, 0.0, 0.0, mean
+        out[0], out[1], out[2], out[3], out[4] = 0.0, 0.0, 0.0, mean, math.nan
         return guess
     at: int = dominant_bin(z, n, energy, alternating, guess, power, turn)
     if 2 * at == n:
         # The sine is zero at every sample; only amplitude and sign of (-1)^i remain.
         out[0], out[1], out[3] = abs(alternating) / n, math.pi, mean
         out[2] = 0.0 if alternating >= 0.0 else -math.pi
+        out[4] = alternating * alternating / (n * energy)
         return at
     w = 2.0 * math.pi * (at + parabola_shift(power, at, n)) / n
     if refine:
@@ -382,9 +383,10 @@ def window_line(x, first, n, guess, refine: bool, work, out):
         for i in range(n, (n + BLOCK - 1) // BLOCK * BLOCK):
             z_s[i] = 0.0
         w = sine_fit(z, z_s, n, energy, w, turn)
-    a, b, k, _, angle = fit_at(z, n, w, turn)
+    a, b, k, explained, angle = fit_at(z, n, w, turn)
     out[0] = math.sqrt(a * a + b * b)
     out[1] = w
     out[2] = math.atan2(-b, a) - angle
     out[3] = mean + k
+    out[4] = explained / energy
     return at

@@ -15,6 +15,7 @@ from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.fourier import FourierFeatures, fourier_features
+from chimera_hpc.measures.quality import FEW_SAMPLES
 from chimera_hpc.measures.variation import total_variation_arrays
 from chimera_hpc.measures.windows import maxima
 from chimera_hpc.recordings.gaps import called
@@ -25,8 +26,6 @@ from chimera_hpc.store.store import Store
 
 Array = NDArray[np.float64]
 
-FEW_SAMPLES = 20.0
-"""Samples a period below which maxima, and with them windows, are placed too coarsely."""
 _FLAT = 1e-6
 """Standard deviation, in root mean squares of the signal, below which it is steady."""
 _SMALL = 1e-2

@@ -20,6 +20,7 @@ from chimera_hpc.classify.modes import run_names
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
+from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
 from chimera_hpc.reduction.selection import check_selections
@@ -109,7 +110,7 @@ class _Work:
         self.notes: list[str] = []
         self.ledger = store.ledger()
         self.status = self.ledger["status"]
-        self.scalars = store.scalars()
+        self.scalars, self.quality = store.scalars(), store.quality()
         self.triplets = np.stack([self.scalars[name] for name in TRIPLET], axis=1)
         axes = [name for name in store.points.axes if name != "seed"]
         self.axes: list[FreeAxis] = free_axes(store.points.cells()[1], axes)
@@ -138,7 +139,10 @@ class _Work:
         self.classification = made
         self.curves = {**self._analyses(), **(curves or {})}
         self.results = build_results(
-            store.sweep, store.points, self.ledger, made, self.curves, claims
+            store.sweep, store.points, self.ledger, made, self.curves, claims, self.quality
+        )
+        self.results["warnings"] = quality_warnings(
+            store.sweep, self.status, self.scalars, self.quality, made.cuts
         )
         self.curves = self.results["curves"]
         audit, line = kept_audit(self.folder, self._basis)
@@ -149,8 +153,11 @@ class _Work:
         write_atomically(self.folder / RESULTS, to_json(self.results).encode())
         self._say(_coverage(self.results["points"]))
         self._explain_missing_classes()
+        r_squared = self.quality["r_squared"]
         self.table = class_table(
-            {str(k): self.results["cuts"][str(k)]["cells"] for k in self.cuts}, self.axes
+            {str(k): self.results["cuts"][str(k)]["cells"] for k in self.cuts},
+            self.axes,
+            {name for k in self.cuts for name in poor_classes(made.cuts[k], r_squared)},
         )
 
     def _basis(self) -> Basis:
@@ -276,6 +283,8 @@ class _Work:
         """Say what was found and where it is."""
         for line in self.table.splitlines():
             self._say(line)
+        for line in self.results["warnings"]:
+            self.note(f"warning: {line}")
         self._say(f"store    {self.store.path}")
         self._say(f"results  {self.folder / RESULTS}")
         if figures:

@@ -16,6 +16,8 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Classification, Cut
 from chimera_hpc.classify.modes import CellTable, modal_classes
+from chimera_hpc.reduction.quality import POOR_FIT, class_fits, describe_quality
+from chimera_hpc.store.schema import QUALITY
 
 SCHEMA = 1
 TRIPLET = ("V_theta", "V_a", "V_Omega")
@@ -41,23 +43,29 @@ def build_results(
     classification: Classification,
     curves: Mapping[str, Any] | None = None,
     claims: Sequence[Mapping[str, Any]] = (),
+    quality: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> dict[str, Any]:
     """Assemble the contents of results.json; plain Python values only, None in place of NaN.
 
     Cells carry every coordinate of `points` but the seed, and what the sweep holds fixed besides
-    (the number of nodes). Beyond the agreed keys, each cut tells the depth of its line, and
-    ``clustering`` tells linkage, scaling, whether a sample was clustered, and the order of splits.
+    (the number of nodes). Beyond the agreed keys, each cut tells the depth of its line, each
+    cluster the median R^2 of its runs and whether that is poor, ``quality`` how well the points are
+    measured (see `reduction.quality`), and ``clustering`` linkage, scaling, whether a sample was
+    clustered, and the order of splits. `quality` are the columns of `Store.quality`.
     """
     status = np.asarray(ledger["status"])
+    unknown = np.full(len(status), np.nan)
+    marks = quality or dict.fromkeys(QUALITY, unknown)
     fixed = sweep.to_dict().get("fixed", {})
     results = {
         "schema": SCHEMA,
         "sweep": sweep.name,
         "points": count_points(status),
         "cuts": {
-            str(asked): _describe_cut(points, status, cut, fixed)
+            str(asked): _describe_cut(points, status, cut, fixed, marks["r_squared"])
             for asked, cut in classification.cuts.items()
         },
+        "quality": describe_quality(marks),
         "clustering": _describe_clustering(classification),
         "curves": dict(curves or {}),
         "claims": [dict(claim) for claim in claims],
@@ -81,11 +89,22 @@ def count_points(status: ArrayLike) -> dict[str, int]:
 
 
 def _describe_cut(
-    points: CellTable, status: NDArray[np.int64], cut: Cut, fixed: Mapping[str, Any]
+    points: CellTable,
+    status: NDArray[np.int64],
+    cut: Cut,
+    fixed: Mapping[str, Any],
+    r_squared: NDArray[np.float64],
 ) -> dict[str, Any]:
+    fits = class_fits(cut, r_squared)
     clusters = [
-        {"name": name, "size": size, "centroid": dict(zip(TRIPLET, centroid, strict=True))}
-        for name, size, centroid in zip(cut.names, cut.sizes, cut.centroids, strict=True)
+        {
+            "name": name,
+            "size": size,
+            "centroid": dict(zip(TRIPLET, centroid, strict=True)),
+            "r_squared": fit,
+            "poorly_fitted": fit < POOR_FIT,
+        }
+        for name, size, centroid, fit in zip(cut.names, cut.sizes, cut.centroids, fits, strict=True)
     ]
     cells = [{**fixed, **cell} for cell in modal_classes(points, status, cut)]
     return {"clusters": clusters, "cells": cells, "depth": cut.depth}
@@ -215,6 +234,7 @@ class _Results(_Part):
     curves: dict[str, Any]
     claims: list[dict[str, Any]]
     audit: _Audit | None = None
+    warnings: list[str] = []
 
 
 def to_json(results: Mapping[str, Any]) -> str:

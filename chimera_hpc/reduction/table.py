@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY
 from chimera_hpc.classify.naming import CLASSES
 from chimera_hpc.reduction.cells import FreeAxis
+from chimera_hpc.reduction.quality import POOR
 
 Cells = Sequence[Mapping[str, Any]]
 
@@ -20,23 +21,50 @@ WIDTH = 100
 _NOTHING = "."
 
 
-def class_table(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
-    """Return the modal classes as text.
+def class_table(
+    cuts: Mapping[str, Cells], axes: Sequence[FreeAxis], poor: Collection[str] = ()
+) -> str:
+    """Return the modal classes of the oscillating runs as text, with the share of these runs.
 
     cuts: for each cut its cells with ``class`` and ``votes``, in one order (as in results.json).
         The first cut is the one that maps and counts show.
     axes: what varies between cells.
+    poor: classes whose runs are poorly fitted; they are marked.
     """
     if not cuts:
         return ""
+    cuts = {cut: [_marked(cell, poor) for cell in cells] for cut, cells in cuts.items()}
     cut, cells = next(iter(cuts.items()))
     if len(axes) < 2 and len(cells) <= MOST_LINES:
         return _lines(cuts, axes)
     if len(axes) == 1:
-        return _ranges(cells, axes[0])
-    if len(axes) == 2 and (text := _map(cells, axes[0], axes[1])):
-        return f"modal classes of {cut} clusters\n{text}"
-    return _counts(cells)
+        text = _ranges(cells, axes[0])
+    elif len(axes) == 2 and (drawn := _map(cells, axes[0], axes[1])):
+        text = f"modal classes of {cut} clusters\n{drawn}"
+    else:
+        text = _counts(cells)
+    return f"{text}\n{_whose(cells)}"
+
+
+def _marked(cell: Mapping[str, Any], poor: Collection[str]) -> Mapping[str, Any]:
+    """Return a cell with the mark behind classes that are poorly fitted, in its votes too."""
+
+    def called(name: str) -> str:
+        return name + POOR if name in poor else name
+
+    votes = {called(name): count for name, count in cell["votes"].items()}
+    return {**cell, "class": cell["class"] and called(cell["class"]), "votes": votes}
+
+
+def _whose(cells: Cells) -> str:
+    """Say of which runs the modal classes are, where not every cell has a line with its share."""
+    shares = [cell["oscillating"] for cell in cells if cell["oscillating"] is not None]
+    mixed = [share for share in shares if 0.0 < share < 1.0]
+    none = sum(share == 0.0 for share in shares)
+    text = f"modal class of the runs that oscillate: all in {len(shares) - len(mixed) - none} cells"
+    if mixed:
+        text += f", {min(mixed):.0%} to {max(mixed):.0%} of them in {len(mixed)}"
+    return text + (f", none in {none}" if none else "")
 
 
 def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
@@ -44,6 +72,7 @@ def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
     for i, (cut, cells) in enumerate(cuts.items()):
         columns.append([f"{cut} clusters", *(cell["class"] or _NOTHING for cell in cells)])
         if i == 0:
+            columns.append(["oscillating", *(_oscillating(cell) for cell in cells)])
             columns.append(["votes", *(_votes(cell) for cell in cells)])
     widths = [max(map(len, column)) for column in columns]
     rows = [
@@ -51,6 +80,11 @@ def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
         for row in zip(*columns, strict=True)
     ]
     return "\n".join(rows)
+
+
+def _oscillating(cell: Mapping[str, Any]) -> str:
+    share = cell["oscillating"]
+    return _NOTHING if share is None else f"{share:.0%}"
 
 
 def _votes(cell: Mapping[str, Any]) -> str:
@@ -101,7 +135,7 @@ def _map(cells: Cells, across: FreeAxis, up: FreeAxis) -> str:
 def _in_order(names: set[str]) -> list[str]:
     """Sort as in figures: ordered, chimera, disordered, others, then what does not oscillate."""
     rank = {name: i for i, name in enumerate(CLASSES)} | {STEADY: 4, NO_WINDOW: 5}
-    return sorted(names, key=lambda name: (rank.get(name, 3), name))
+    return sorted(names, key=lambda name: (rank.get(name.rstrip(POOR), 3), name))
 
 
 def _letters(names: Sequence[str]) -> dict[str, str]:

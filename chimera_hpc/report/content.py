@@ -53,6 +53,8 @@ class Content:
     scan: LedgerScan
     triplets: NDArray[np.float64]
     """(n, 3) V_theta, V_a, V_Omega; NaN where a point has none."""
+    r_squared: NDArray[np.float64]
+    """(n,) median R^2 of the fits of each point; NaN where a point has none."""
     classification: Classification
     results: Mapping[str, Any]
     """results.json, as far as it belongs to this sweep; empty when there is none yet."""
@@ -71,7 +73,8 @@ class Content:
         scan, scalars = store.scan(), store.scalars()
         triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
         made = _classified(store, triplets, scan.columns["status"], largest_tree)
-        return cls(folder, store, scan, triplets, made, _results(folder, store))
+        r_squared = store.quality()["r_squared"]
+        return cls(folder, store, scan, triplets, r_squared, made, _results(folder, store))
 
     @property
     def status(self) -> Integers:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 
 from matplotlib.colors import to_hex
 
 from chimera_hpc.plot.style import colour_of, family_and_number, lighten, marker_of, spoken
+from chimera_hpc.reduction.quality import POOR
 
 _SHAPES = {
     "o": ("circle", "circle_dot", "circle_x", "circle_cross"),
@@ -60,6 +62,9 @@ def look_of(name: str) -> Look:
     )
 
 
-def looks_of(names: tuple[str, ...]) -> list[dict[str, str]]:
-    """Return the looks of classes as plain values."""
-    return [asdict(look_of(name)) for name in names]
+def looks_of(names: tuple[str, ...], poor: Collection[str] = ()) -> list[dict[str, str]]:
+    """Return the looks of classes as plain values; poorly fitted ones have a mark at the name."""
+    looks = [asdict(look_of(name)) for name in names]
+    for name, look in zip(names, looks, strict=True):
+        look["name"] += POOR if name in poor else ""
+    return looks

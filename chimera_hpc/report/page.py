@@ -94,6 +94,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "data": _script_safe(payload(content, shown, pictured, top)),
         "axes": axis_labels(content),
         "outcomes": _outcomes(content),
+        "warnings": content.results.get("warnings", []),
         "failures": _failures(content),
         "most_failures": MOST_FAILURES,
         "runs": _runs(content),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
+from chimera_hpc.reduction.quality import poor_classes
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import looks_of
 from chimera_hpc.report.pictures import Plates, rounded
@@ -97,7 +98,7 @@ def _cut(content: Content, shown: Shown, top: TreeTop, k: int) -> dict[str, Any]
     counted = content.votes(cut)
     members = content.classification.members
     return {
-        "looks": looks_of(counted.names),
+        "looks": looks_of(counted.names, poor_classes(cut, content.r_squared)),
         "sizes": cut.sizes.tolist(),
         "depth": rounded(cut.depth, 6),
         "modal": counted.modal[shown.cells].tolist(),

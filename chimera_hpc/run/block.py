@@ -20,6 +20,7 @@ from chimera_hpc.job.models import build
 from chimera_hpc.job.registry import measures, method
 from chimera_hpc.measures.fourier import FourierFeatures, fourier_features
 from chimera_hpc.measures.measure import Measure, MeasuredRun
+from chimera_hpc.measures.quality import quality
 from chimera_hpc.measures.series import by_node, quantise, round_to
 from chimera_hpc.models.protocol import Model
 from chimera_hpc.run.initial_state import initial_state
@@ -176,6 +177,7 @@ class _Block:
         result.status[row] = features.status
         result.n_windows[row] = features.n_windows
         result.features[row] = features.as_array()
+        result.quality[row] = quality(features, self.sweep.integrator.t_step)
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
 
     def features(self, u: Array) -> FourierFeatures:

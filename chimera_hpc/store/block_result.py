@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.store.schema import FEATURES, MISSING, scalar_labels
+from chimera_hpc.store.schema import FEATURES, MISSING, QUALITY, scalar_labels
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,7 @@ class BlockResult:
     features (n, 8, N0): along axis 1 `schema.FEATURES`; NaN unless the point is DONE.
     scalars (n, n_scalars): along axis 1 `schema.scalar_labels`; like the features, of u as it is
         stored (`rounded`).
+    quality (n, 2): along axis 1 `schema.QUALITY`; NaN unless the point is DONE.
     steps, elapsed_us, n_windows (n,): accepted steps, share of the wall time in microseconds,
         Fourier windows.
     series (n, T, N0): u on the analysis interval as it is stored; None when the sweep keeps none.
@@ -33,6 +34,7 @@ class BlockResult:
     status: NDArray[np.int64]
     features: Array
     scalars: Array
+    quality: Array
     steps: NDArray[np.int64]
     elapsed_us: NDArray[np.int64]
     n_windows: NDArray[np.int64]
@@ -57,6 +59,7 @@ def empty_result(sweep: Sweep, n: int) -> BlockResult:
         status=np.full(n, int(Status.NEVER), dtype=np.int64),
         features=np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
         scalars=np.full((n, len(scalar_labels(sweep))), np.nan),
+        quality=np.full((n, len(QUALITY)), np.nan),
         steps=np.zeros(n, dtype=np.int64),
         elapsed_us=np.zeros(n, dtype=np.int64),
         n_windows=np.zeros(n, dtype=np.int64),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,14 +53,20 @@ class BlockFiles:
 
     path: Path
     shapes: Mapping[str, tuple[int, ...]]
-    """Shape of a chunk of each array that the store has; `u` is missing where no series is kept."""
+    """Shape of a chunk of each array that the store has.
+
+    `u` is missing where no series is kept, and what is `OPTIONAL` in a store of an older version.
+    """
     series_dtype: str
 
     @classmethod
-    def of(cls, path: Path, sweep: Sweep, block_size: int) -> BlockFiles:
-        """Return the files of a sweep's store."""
+    def of(
+        cls, path: Path, sweep: Sweep, block_size: int, without: Collection[str] = ()
+    ) -> BlockFiles:
+        """Return the files of a sweep's store, which lacks the arrays `without`."""
         plans = {plan.name: plan for plan in block_plans(sweep, block_size, block_size)}
-        shapes = {name: plans[name].chunks for name in BLOCK_ARRAYS if name in plans}
+        names = [name for name in BLOCK_ARRAYS if name in plans and name not in without]
+        shapes = {name: plans[name].chunks for name in names}
         return cls(path, shapes, sweep.keep.dtype)
 
     def file(self, name: str, block: int) -> Path:

@@ -63,7 +63,10 @@ def open_sweep(path: str | Path) -> xr.Dataset:
         # We know better than what the file says: its copy is sound.
         raise BadInput(f"{store.path}: its metadata are damaged; `run` writes them again") from None
     ledger = store.ledger()
-    dataset: xr.Dataset = stored.drop_vars(["features", "scalars", "ledger"])
+    tables: dict[str, Mapping[str, NDArray[Any]]] = {"scalars": store.scalars(), "ledger": ledger}
+    if "quality" in stored:
+        tables["quality"] = store.quality()
+    dataset: xr.Dataset = stored.drop_vars(["features", *tables])
     dataset = dataset.assign_coords(cell=("point", store.points.cells()[0], _attributes("cell")))
     features = stored["features"]
     never = ledger["status"] == Status.NEVER
@@ -73,7 +76,6 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     for k, (label, unit) in enumerate(_labels(stored["features"])):
         dataset[label] = features.isel(feature=k)
         dataset[label].attrs = _attributes(label, unit)
-    tables: dict[str, Mapping[str, NDArray[Any]]] = {"scalars": store.scalars(), "ledger": ledger}
     for name, columns in tables.items():
         for label, unit in _labels(stored[name]):
             dataset[label] = ("point", columns[label], _attributes(label, unit))

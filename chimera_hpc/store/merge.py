@@ -129,8 +129,8 @@ class _Merge:
         for row in np.flatnonzero(source >= 0).tolist():
             k = int(source[row])
             block, old = divmod(int(self.place[k][start + row]), self.stores[k].block_size)
-            for name, chunk in chunks.items():
-                chunk[row] = self._chunk(k, name, block)[old]
+            for name in self.stores[k].files.shapes:
+                chunks[name][row] = self._chunk(k, name, block)[old]
             chunks["ledger"][row, _RUN] += self.first_run[k]
         return chunks
 

@@ -14,7 +14,7 @@ from chimera_hpc.store.schema import decode_series
 
 
 def gather(files: BlockFiles, name: str, scan: LedgerScan) -> NDArray[np.float64]:
-    """Return `features` or `scalars` over all points; NaN where a point never ran.
+    """Return `features`, `scalars` or `quality` over all points; NaN where a point never ran.
 
     Raises DamagedChunk rather than give NaN for what was there.
     """

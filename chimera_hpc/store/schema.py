@@ -23,8 +23,12 @@ from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.registry import measures
 from chimera_hpc.store.ledger import FIELDS
 
-BLOCK_ARRAYS = ("u", "features", "scalars", "ledger")
+BLOCK_ARRAYS = ("u", "features", "scalars", "quality", "ledger")
 """Arrays with one chunk per block, in the order in which a block is written."""
+OPTIONAL = frozenset({"quality"})
+"""Block arrays that a store may lack: versions before 0.2 did not plan them."""
+QUALITY = ("samples_per_period", "r_squared")
+"""How well each run is measured, see `measures.quality`."""
 FEATURES = (
     "amplitude",
     "frequency",
@@ -179,6 +183,15 @@ def block_plans(
             long_name="one number a run: total variations, measures of incoherence",
             labels=list(scalars),
             label_units=["1"] * len(scalars),
+        ),
+        plan(
+            "quality",
+            (("mark", len(QUALITY)),),
+            "float64",
+            math.nan,
+            long_name="samples per period of the fastest node, median R^2 of the fits of a run",
+            labels=list(QUALITY),
+            label_units=["1"] * len(QUALITY),
         ),
         plan(
             "ledger",

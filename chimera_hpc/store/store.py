@@ -41,7 +41,7 @@ from chimera_hpc.store.reduction import (
 )
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import start_run
-from chimera_hpc.store.schema import BLOCK_ARRAYS, scalar_labels, series_mask
+from chimera_hpc.store.schema import BLOCK_ARRAYS, OPTIONAL, QUALITY, scalar_labels, series_mask
 from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
 from chimera_hpc.store.write import Receipt, write_block
 
@@ -55,9 +55,9 @@ _FREE_TABLES = ("name", "title", "reduction", "run", "slurm")
 class Store:
     """One sweep's results on disk, block by block; make one with `plan` or `open`.
 
-    A block is written whole: `u`, `features`, `scalars`, then the ledger, so that what the ledger
-    vouches for is on the disk. Results are never overwritten: a late or repeated write of a block
-    leaves every finished row as it is.
+    A block is written whole, the ledger last, so that what the ledger vouches for is on the disk.
+    Results are never overwritten: a late or repeated write of a block leaves every finished row as
+    it is.
     """
 
     def __init__(self, path: Path, metadata: Mapping[str, Any], sweep: Sweep) -> None:
@@ -66,7 +66,8 @@ class Store:
         self.metadata = metadata
         self.sweep = sweep
         self.n_points, self.block_size = ledger_shape(metadata)
-        self.files = BlockFiles.of(path, sweep, self.block_size)
+        nodes = metadata["consolidated_metadata"]["metadata"]
+        self.files = BlockFiles.of(path, sweep, self.block_size, OPTIONAL - set(nodes))
 
     @classmethod
     def plan(cls, path: str | Path, sweep: Sweep) -> Self:
@@ -276,6 +277,16 @@ class Store:
         table = gather(self.files, "scalars", self.scan())
         labels = scalar_labels(self.sweep)
         return {label: table[:, k] for k, label in enumerate(labels)}
+
+    def quality(self) -> dict[str, NDArray[np.float64]]:
+        """Return each mark of `QUALITY` over all points by its name.
+
+        NaN where a point has no result, and throughout a store that a version before 0.2 planned.
+        """
+        if "quality" not in self.files.shapes:
+            return {label: np.full(self.n_points, np.nan) for label in QUALITY}
+        table = gather(self.files, "quality", self.scan())
+        return {label: table[:, k] for k, label in enumerate(QUALITY)}
 
     def series(self, i: int) -> NDArray[np.float64]:
         """Return u of point i over the analysis interval, shape (times, nodes).

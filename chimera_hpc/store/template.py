@@ -36,6 +36,7 @@ from chimera_hpc.store.ledger import (
 )
 from chimera_hpc.store.schema import (
     BLOCK_ARRAYS,
+    OPTIONAL,
     ArrayPlan,
     array_plans,
     block_plans,
@@ -139,7 +140,8 @@ def check_root(path: Path, root: Mapping[str, Any]) -> Sweep:
     n_points = attributes["n_points"]
     damaged = [name for name, node in nodes.items() if not _is_sound(name, node, n_points)]
     for plan in block_plans(sweep, n_points, attributes["block_size"]):
-        if not _matches(nodes.get(plan.name), plan):
+        missing = plan.name in OPTIONAL and plan.name not in nodes
+        if not missing and not _matches(nodes.get(plan.name), plan):
             damaged.append(plan.name)
     if damaged:
         raise BadInput(f"{path}: the metadata of {damaged[0][:100]!r} are damaged")

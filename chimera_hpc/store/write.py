@@ -108,6 +108,7 @@ def _rows(result: BlockResult, run: int, attempts: NDArray[np.int64]) -> Rows:
     }
     ledger = np.stack([fields[name] for name in FIELDS], axis=1).astype("<i8")
     rows: Rows = {"features": features, "scalars": scalars, "ledger": ledger}
+    rows["quality"] = canonical(result.quality)
     if result.series is not None:
         rows["u"] = result.series
     return rows

@@ -36,6 +36,7 @@ def test_cell_carries_coordinates_votes_and_entropy(table: Any) -> None:
         "P": 7,
         "epsilon": 0.05,
         "class": "chimera",
+        "oscillating": 1.0,
         "votes": {"ordered": 1, "chimera": 3},
         "entropy_bits": pytest.approx(0.8112781244591328),
     }
@@ -53,23 +54,35 @@ def test_unanimous_cell_has_no_entropy(table: Any) -> None:
 def test_steady_runs_vote_but_do_not_decide(table: Any) -> None:
     cell = one_cell(table, [-1, -1, -1, 1], [S, S, S, D])
     assert cell["class"] == "chimera"
+    assert cell["oscillating"] == 0.25
     assert cell["votes"] == {"chimera": 1, "steady": 3}
 
 
 def test_cell_with_steady_runs_only_is_steady(table: Any) -> None:
     cell = one_cell(table, [-1, -1], [S, S])
-    assert (cell["class"], cell["votes"]) == ("steady", {"steady": 2})
+    assert (cell["class"], cell["oscillating"]) == ("steady", 0.0)
+    assert cell["votes"] == {"steady": 2}
 
 
 def test_runs_without_a_window_are_counted_apart(table: Any) -> None:
     cell = one_cell(table, [-1, -1, 0], [W, S, D])
     assert cell["votes"] == {"ordered": 1, "steady": 1, "no_window": 1}
-    assert one_cell(table, [-1], [W])["class"] == "steady"
+
+
+@pytest.mark.parametrize(
+    ("status", "expected"),
+    [([W], "no_window"), ([W, S], "no_window"), ([W, S, S], "steady"), ([W, N], "no_window")],
+)
+def test_a_cell_is_steady_only_if_most_of_its_runs_are(
+    table: Any, status: list[Status], expected: str
+) -> None:
+    assert one_cell(table, [-1] * len(status), status)["class"] == expected
 
 
 def test_cell_without_result_has_no_class(table: Any) -> None:
     cell = one_cell(table, [-1, -1], [N, F])
     assert (cell["class"], cell["votes"], cell["entropy_bits"]) == (None, {}, 0.0)
+    assert cell["oscillating"] is None
 
 
 def test_ties_go_to_the_larger_total_membership(table: Any) -> None:

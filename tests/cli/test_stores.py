@@ -108,7 +108,7 @@ def test_verify_finds_nothing_wrong_with_a_sound_store(finished: Path, sweep: Ru
     assert contents(finished) == before
 
 
-@pytest.mark.parametrize("array", ["u", "features", "scalars"])
+@pytest.mark.parametrize("array", ["u", "features", "scalars", "quality"])
 def test_verify_names_a_flipped_byte_and_run_mends_it(
     array: str, job: Path, finished: Path, sweep: Run
 ) -> None:

@@ -289,7 +289,7 @@ def left_over(trial: Trial) -> Finding:
     child.signal(signal.SIGKILL)
     trial.ended(child, (-9, 0))
     mark = _mark_of_the_dead()
-    for folder in ("", "u", "features", "scalars", "ledger", "claims", "runs"):
+    for folder in ("", "u", "features", "scalars", "quality", "ledger", "claims", "runs"):
         (trial.store / folder / f".c.0.{mark}.0123abcd.partial").write_bytes(b"part")
     (trial.out / f".store.zarr.{mark}.0123abcd.partial").mkdir()
     trial.resume()
@@ -404,7 +404,7 @@ def _copy_reference(trial: Trial) -> None:
 
 
 def _some_chunk(trial: Trial) -> Path:
-    array = trial.random.choice(["u", "features", "scalars", "ledger"])
+    array = trial.random.choice(["u", "features", "scalars", "quality", "ledger"])
     return trial.random.choice(sorted((trial.store / array).glob("c.*")))
 
 

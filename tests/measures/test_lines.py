@@ -79,7 +79,7 @@ def test_rotations_kept_from_other_windows_change_no_bit(windows, seed):
         alone = lines.work_arrays(90)
         found = []
         for work in (shared, alone):
-            out = np.empty(4)
+            out = np.empty(5)
             found.append((lines.window_line(x, 0, n, guess, False, work, out), out.tobytes()))
         assert found[0] == found[1]
 

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 import pytest
 
-from chimera_hpc.measures.fourier import FEATURES, fourier_features
+from chimera_hpc.measures.fourier import FEATURES, fourier_features, window_lines
 from chimera_hpc.measures.incoherence import local_sigma, order_parameter, sigma
 
 CLOCKS = ("ring", "own")
@@ -44,6 +44,20 @@ def test_three_steps_equal_rfft_polyfit_and_lstsq(clock, phase_mean, time_origin
     features = fourier_features(t, u, **options)
     assert features.n_windows >= 3
     assert_same_features(features, naive.fourier_features(t, u, **options), 1e-10)
+
+
+@pytest.mark.parametrize("refine", ["parabola", "sine-fit"])
+def test_r_squared_is_the_share_of_the_variance_that_the_fit_explains(refine):
+    t, u = oscillators()
+    found = window_lines(t, u, refine=refine)
+    first, last = int(found.first[0, 1]), int(found.last[0, 1])
+    y, time = u[first : last + 1], t[first : last + 1, None] - t[first]
+    angle = 2 * np.pi * found.frequency[:, 1] * time + found.phase[:, 1]
+    rest = y - found.baseline[:, 1] - found.amplitude[:, 1] * np.cos(angle)
+    expected = 1 - (rest**2).sum(axis=0) / ((y - y.mean(axis=0)) ** 2).sum(axis=0)
+    np.testing.assert_allclose(found.r_squared[:, 1], expected, rtol=1e-9)
+    mean = fourier_features(t, u, refine=refine).r_squared
+    np.testing.assert_allclose(mean, found.r_squared.mean(axis=1), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_finished_sweep_gives_classes_counts_and_paths(tmp_path):
     assert summary.notes == ()
     assert lines[0] == "15 of 15 points run: 15 oscillate"
     assert summary.table.splitlines() == lines[1:5]
-    assert lines[2].split()[:4] == ["2", "ordered", "ordered", "5"]
+    assert lines[2].split()[:5] == ["2", "ordered", "100%", "ordered", "5"]
     assert lines[-1] == f"results  {tmp_path / 'results.json'}"
 
 
@@ -128,7 +128,10 @@ def test_sweep_without_any_result_says_so(tmp_path):
 def test_sweep_that_stands_still_says_so(tmp_path):
     filled(tmp_path, status=dict.fromkeys(CENTRES, Status.STEADY))
     summary, _ = told(tmp_path)
-    assert summary.notes == ("no run oscillates yet: there is nothing to classify",)
+    nothing, warning = summary.notes
+    assert nothing == "no run oscillates yet: there is nothing to classify"
+    assert "though u varies by up to" in warning
+    assert "features.steady_threshold = 0.01, has the unit of u" in warning
     classes = {cell["class"] for cell in results_in(tmp_path)["cuts"]["3"]["cells"]}
     assert classes == {"steady"}
     assert {path.stem for path in summary.figures} == {"modal_classes_3"}
@@ -148,6 +151,61 @@ def test_failed_points_are_counted(tmp_path):
     filled(tmp_path, FAST, status={3: Status.NON_FINITE, 4: Status.NO_WINDOW})
     _, lines = told(tmp_path)
     assert lines[0] == ("15 of 15 points run: 5 oscillate, 5 without a complete window, 5 failed")
+
+
+def test_a_cell_whose_runs_have_no_window_is_not_steady(tmp_path):
+    store = filled(tmp_path, FAST, status={3: Status.STEADY, 4: Status.NO_WINDOW})
+    summary, _ = told(tmp_path)
+    cells = results_in(tmp_path)["cuts"]["3"]["cells"]
+    assert [(cell["class"], cell["oscillating"]) for cell in cells] == [
+        ("ordered", 1.0),
+        ("steady", 0.0),
+        ("no_window", 0.0),
+    ]
+    assert [line.split()[1] for line in summary.table.splitlines()[1:]] == [
+        "ordered",
+        "steady",
+        "no_window",
+    ]
+    assert "5 of 15 points (33.3 %) have fewer than features.n_peaks" in summary.notes[-1]
+    stored, names = store.reduction(), store.reduction().attributes["names_3"]
+    modal = [names[k] for k in stored.arrays["modal_class_3"]]
+    assert modal == ["ordered", "steady", "no_window"]
+
+
+def test_too_few_samples_and_poor_fits_are_warned_of_once(tmp_path, monkeypatch):
+    store = filled(tmp_path, FAST)
+    few, poor = store.points.columns["P"] == 4, store.points.columns["P"] == 2
+    marks = {
+        "samples_per_period": np.where(few, 8.0, 30.0),
+        "r_squared": np.where(poor, 0.3, 0.9),
+    }
+    monkeypatch.setattr(Store, "quality", lambda self: marks)
+    summary, lines = told(tmp_path)
+    samples, fit = summary.notes
+    assert samples == (
+        "warning: 5 of 15 oscillating points (33.3 %) have fewer than 20 samples per period of the "
+        "fastest node (as few as 8): their classes may be wrong; run again with "
+        "--set integrator.t_step=0.2 and another --out"
+    )
+    assert fit.startswith("warning: ordered* is poorly fitted: the sine explains 30% of the")
+    assert lines.count(samples) == lines.count(fit) == 1
+    results = results_in(tmp_path)
+    assert [f"warning: {line}" for line in results["warnings"]] == [samples, fit]
+    assert results["quality"]["samples_per_period"] == {
+        "limit": 20.0,
+        "points": 15,
+        "below": 5,
+        "least": 8.0,
+        "median": 30.0,
+    }
+    clusters = results["cuts"]["3"]["clusters"]
+    assert [(c["r_squared"], c["poorly_fitted"]) for c in clusters] == [
+        (0.3, True),
+        (0.9, False),
+        (0.9, False),
+    ]
+    assert summary.table.splitlines()[1].split()[1] == "ordered*"
 
 
 def test_folder_without_a_store_is_bad_input(tmp_path):
@@ -399,29 +457,52 @@ def test_place_names_what_varies():
 
 
 def cells_of(classes):
-    return [{"class": name, "votes": {name: 2} if name else {}} for name in classes]
+    shares = {"steady": 0.0, None: None}
+    return [
+        {
+            "class": name,
+            "oscillating": shares.get(name, 1.0),
+            "votes": {name: 2} if name else {},
+        }
+        for name in classes
+    ]
 
 
 def test_table_of_few_cells_has_a_line_for_each():
     cells = {"3": cells_of(["ordered", None]), "4": cells_of(["ordered-1", None])}
-    cells["3"][0]["votes"] = {"steady": 1, "ordered": 2}
+    cells["3"][0] |= {"oscillating": 2 / 3, "votes": {"steady": 1, "ordered": 2}}
     table = class_table(cells, [FreeAxis(("P", "Q"), np.array([9, 10]))])
     assert table.splitlines() == [
-        "P = Q  3 clusters  votes                4 clusters",
-        "9      ordered     ordered 2, steady 1  ordered-1",
-        "10     .           none yet             .",
+        "P = Q  3 clusters  oscillating  votes                4 clusters",
+        "9      ordered     67%          ordered 2, steady 1  ordered-1",
+        "10     .           .            none yet             .",
+    ]
+
+
+def test_table_marks_classes_that_are_poorly_fitted():
+    cells = {"3": cells_of(["ordered", "chimera"])}
+    table = class_table(cells, [FreeAxis(("P",), np.array([9, 12]))], {"ordered"})
+    assert table.splitlines()[1:] == [
+        "9   ordered*    100%         ordered* 2",
+        "12  chimera     100%         chimera 2",
     ]
 
 
 def test_table_of_many_values_lists_stretches():
     classes = ["ordered"] * 40 + ["chimera"] + ["ordered"] * 30
     table = class_table({"3": cells_of(classes)}, [FreeAxis(("flips",), np.arange(71))])
-    assert table.splitlines() == ["ordered  flips: 0-39, 41-70", "chimera  flips: 40"]
+    assert table.splitlines() == [
+        "ordered  flips: 0-39, 41-70",
+        "chimera  flips: 40",
+        "modal class of the runs that oscillate: all in 71 cells",
+    ]
 
 
 def test_table_of_two_axes_is_a_map_with_the_second_axis_upwards():
     axes = [FreeAxis(("P",), np.array([3, 3, 10, 10])), FreeAxis(("Q",), np.array([0, 1, 0, 1]))]
-    table = class_table({"3": cells_of(["disordered", "chimera", "steady", None])}, axes)
+    cells = cells_of(["disordered", "chimera", "steady", None])
+    cells[1]["oscillating"] = 0.05
+    table = class_table({"3": cells}, axes)
     assert table.splitlines() == [
         "modal classes of 3 clusters",
         "Q",
@@ -429,13 +510,14 @@ def test_table_of_two_axes_is_a_map_with_the_second_axis_upwards():
         "0  d  s",
         "   3 10  P",
         "c chimera, d disordered, s steady",
+        "modal class of the runs that oscillate: all in 1 cells, 5% to 5% of them in 1, none in 1",
     ]
 
 
 def test_classes_with_one_initial_get_different_letters():
     axes = [FreeAxis(("P",), np.arange(3)), FreeAxis(("Q",), np.zeros(3))]
     table = class_table({"3": cells_of(["wave", "waltz", "wane"])}, axes)
-    letters = [part.split()[0] for part in table.splitlines()[-1].split(", ")]
+    letters = [part.split()[0] for part in table.splitlines()[-2].split(", ")]
     assert len(set(letters)) == 3
 
 
@@ -445,4 +527,8 @@ def test_table_too_large_for_the_terminal_counts_cells(shape):
     axes = [FreeAxis((name,), g.ravel()) for name, g in zip("abc", grids, strict=False)]
     half = grids[0].size // 2
     table = class_table({"3": cells_of(["ordered"] * half + ["chimera"] * half)}, axes)
-    assert table.splitlines() == [f"{half:8d} cells ordered", f"{half:8d} cells chimera"]
+    assert table.splitlines() == [
+        f"{half:8d} cells ordered",
+        f"{half:8d} cells chimera",
+        f"modal class of the runs that oscillate: all in {2 * half} cells",
+    ]

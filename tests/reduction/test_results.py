@@ -73,6 +73,7 @@ def test_cells_carry_axes_and_fixed_parameters(results: dict[str, Any]) -> None:
         "epsilon": 0.05,
         "P": 5,
         "class": "ordered",
+        "oscillating": pytest.approx(2 / 3),
         "votes": {"ordered": 2, "steady": 1},
         "entropy_bits": pytest.approx(0.9182958340544896),
     }

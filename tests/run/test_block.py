@@ -52,7 +52,7 @@ def join(results):
     return {name: np.concatenate(arrays) for name, arrays in parts.items()}
 
 
-NOT_TIMES = ("status", "features", "scalars", "steps", "n_windows", "series")
+NOT_TIMES = ("status", "features", "scalars", "quality", "steps", "n_windows", "series")
 
 
 def assert_same(result, expected, order=slice(None)):

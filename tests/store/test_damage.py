@@ -18,7 +18,7 @@ from chimera_hpc.store.blocks import DamagedChunk
 from chimera_hpc.store.claims import claim_block
 from chimera_hpc.store.store import Store
 
-ARRAYS = ("u", "features", "scalars", "ledger")
+ARRAYS = ("u", "features", "scalars", "quality", "ledger")
 
 
 @pytest.fixture

@@ -105,12 +105,12 @@ def test_an_extension_is_on_the_disk_before_its_root_is(filled: Store, disk: Dis
     assert state(filled.path / "zarr.json") in disk.safe
     assert state(filled.path) in disk.safe
     changed = {path.parent.name for path in walk(filled.path) if state(path) not in before}
-    assert changed > {"P", "Q", "seed", "u", "features", "scalars", "ledger"}
+    assert changed > {"P", "Q", "seed", "u", "features", "scalars", "quality", "ledger"}
 
 
 def test_data_of_a_block_are_on_the_disk_before_its_ledger_is(filled: Store, disk: Disk) -> None:
     filled.discard_block(2)
-    for name in ("u", "features", "scalars"):
+    for name in ("u", "features", "scalars", "quality"):
         filled.files.file(name, 2).unlink()
     disk.look_when_named(filled.files.file("ledger", 2), filled.path)
     filled.write_block(2, block_results(filled, 2), 2, 1)

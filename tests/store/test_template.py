@@ -43,7 +43,8 @@ else:
     raise SystemExit("chimera_hpc can be imported")
 for chunks in ({}, None):
     with xr.open_zarr(sys.argv[1], chunks=chunks) as data:
-        assert dict(data.sizes) == dict(point=15, time=21, node=12, feature=8, quantity=15, field=7)
+        labels = dict(feature=8, quantity=15, mark=2, field=7)
+        assert dict(data.sizes) == dict(point=15, time=21, node=12, **labels)
         for name in "P Q seed orientation flips flip_set epsilon b c delta".split():
             assert data[name].dims == ("point",) and name in data.coords, name
             assert name in data.u.coords and name in data.ledger.coords
@@ -52,7 +53,8 @@ for chunks in ({}, None):
         assert data.u.dims == ("point", "time", "node") and data.u.dtype == "float64"
         assert data.u.encoding["dtype"] == "int16"
         assert np.allclose(data.time, np.arange(10, 20.1, 0.5))
-        for name, dimension in dict(features="feature", scalars="quantity", ledger="field").items():
+        labelled = dict(features="feature", scalars="quantity", quality="mark", ledger="field")
+        for name, dimension in labelled.items():
             assert len(data[name].attrs["labels"]) == data.sizes[dimension]
         assert (data.ledger.values[:, 0] == 255).sum() == 11
         assert np.isnan(data.u.values).sum() == 11 * 21 * 12
@@ -96,7 +98,7 @@ def test_zarr_lists_the_arrays_and_nothing_else(tmp_path: Path) -> None:
         "delta",
     }
     coordinates = set(store.points.columns)
-    assert set(names) == {"u", "time", "features", "scalars", "ledger"} | coordinates
+    assert set(names) == {"u", "time", "features", "scalars", "quality", "ledger"} | coordinates
 
 
 def test_consolidated_metadata_are_what_zarr_would_write(tmp_path: Path) -> None:
@@ -138,7 +140,7 @@ def test_ledger_is_plain_bytes_and_a_checksum(tmp_path: Path) -> None:
 
 def test_one_chunk_a_block_and_one_inner_chunk_a_point(tmp_path: Path) -> None:
     store = make_store(tmp_path)
-    for name in ("u", "features", "scalars", "ledger"):
+    for name in ("u", "features", "scalars", "quality", "ledger"):
         grid = nodes(store)[name]["chunk_grid"]["configuration"]["chunk_shape"]
         assert grid[0] == store.block_size == 4
     inner = nodes(store)["u"]["codecs"][0]["configuration"]["chunk_shape"]

@@ -9,10 +9,12 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.cli.main import main
+from chimera_hpc.store.labelled import open_sweep
 from chimera_hpc.store.store import Store
 
 ARCHIVE = Path(__file__).parents[1] / "data" / "store-0.1.zip"
@@ -79,6 +81,20 @@ def test_it_resumes_and_keeps_what_it_has(sweep: Path) -> None:
     after = digests(sweep)
     assert before.items() <= after.items()
     assert after == DIGESTS
+
+
+def test_it_has_no_quality_and_merges_with_a_store_that_has(sweep: Path, tmp_path: Path) -> None:
+    store = Store.open(sweep / "store.zarr")
+    assert np.isnan(store.quality()["r_squared"]).all()
+    assert "samples_per_period" not in open_sweep(sweep)
+    words = ["run", "quickstart", *SETTINGS, "--set", "seeds=[7]", "--out", str(tmp_path / "new")]
+    assert main([*words, "--cluster", "serial", "--no-figures"]) == 0
+    merged = ["merge", str(sweep), str(tmp_path / "new"), "--out", str(tmp_path / "all")]
+    assert main(merged) in (0, 75)
+    found = Store.open(tmp_path / "all" / "store.zarr")
+    known = np.isfinite(found.quality()["samples_per_period"])
+    assert found.points.columns["seed"][known].tolist() == [7]  # P = 3 is steady
+    assert "samples_per_period" in open_sweep(tmp_path / "all")
 
 
 def test_it_extends(sweep: Path) -> None:

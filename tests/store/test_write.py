@@ -76,7 +76,7 @@ def test_chunks_appear_in_order_the_ledger_last(store: Store, monkeypatch: Any) 
     monkeypatch.setattr(os, "replace", watch)
     monkeypatch.setattr(os, "fsync", note)
     store.write_block(2, block_results(store, 2), 1, 1)
-    assert renamed == [(n, True) for n in ("u", "features", "scalars", "ledger")]
+    assert renamed == [(n, True) for n in ("u", "features", "scalars", "quality", "ledger")]
     folders = {name: (store.path / name).stat().st_ino for name in store.files.shapes}
     assert synced.index(folders["features"]) < synced.index(folders["ledger"])
     assert synced[-1] == folders["ledger"]
@@ -310,7 +310,7 @@ def test_a_claim_of_the_right_owner_lets_him_write(store: Store) -> None:
     claim.release()
 
 
-def test_a_block_without_series_is_three_files_and_no_work_of_zarr(
+def test_a_block_without_series_is_four_files_and_no_work_of_zarr(
     tmp_path: Path, monkeypatch: Any
 ) -> None:
     store = make_store(tmp_path, "keep.series=none")
@@ -321,4 +321,4 @@ def test_a_block_without_series_is_three_files_and_no_work_of_zarr(
     monkeypatch.setattr("chimera_hpc.store.blocks.create_array", None)
     store.write_block(0, made, 1, 1)
     # Each file and the folder of each.
-    assert len(flushed) == 6
+    assert len(flushed) == 8

@@ -26,6 +26,11 @@
     return look ? `${look.sign} ${look.name}` : "no result yet";
   }
 
+  function shareText(row) {
+    const votes = cut().votes[row], total = sum(votes);
+    return total ? `${Math.round(100 * sum(votes.slice(0, cut().sizes.length)) / total)} %` : "";
+  }
+
   function runsText(row) {
     const failed = cells.failed[row] ? `, ${cells.failed[row]} failed` : "";
     return `${cells.results[row]} of ${cells.total[row]} have a result${failed}`;
@@ -49,7 +54,7 @@
       columns.x.push(cells.place[0][row]);
       columns.y.push(flat ? 1.17 : cells.place[1][row]);
       columns.box.push(flat ? 0.65 : cells.place[1][row]);
-      columns.class.push(className(row));
+      columns.class.push(sum(votes[row]) ? `${className(row)} (${shareText(row)} oscillate)` : className(row));
       columns.votes.push(votesText(votes[row], looks));
       columns.entropy.push(bits.toFixed(3));
       columns.runs.push(runsText(row));
@@ -146,7 +151,7 @@
       button.textContent = name;
       button.addEventListener("click", () => { choose(row); $("details").scrollIntoView(); });
       const votes = cut().votes[row];
-      for (const content of [button, className(row), votesText(votes, cut().looks), entropy(votes).toFixed(3), runsText(row)]) {
+      for (const content of [button, className(row), shareText(row), votesText(votes, cut().looks), entropy(votes).toFixed(3), runsText(row)]) {
         const box = document.createElement("td");
         box.append(content);
         line.append(box);
@@ -211,7 +216,7 @@
     }
     const votes = cut().votes[row];
     $("details-name").textContent = cells.name[row];
-    $("details-words").textContent = `${className(row)}. Votes: ${votesText(votes, cut().looks)}; ` +
+    $("details-words").textContent = `${className(row)}${sum(votes) ? `; ${shareText(row)} of the runs oscillate` : ""}. Votes: ${votesText(votes, cut().looks)}; ` +
       `entropy ${entropy(votes).toFixed(3)} bits; ${runsText(row)}.` +
       (plate ? "" : cells.results[row] ? " This cell carries no picture: see the summary." : "");
     if (plate) showRun(plate);

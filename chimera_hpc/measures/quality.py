@@ -1,0 +1,35 @@
+"""How well a run is measured: samples per period, and how far its signals are sines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from chimera_hpc.measures.fourier import FourierFeatures
+
+FEW_SAMPLES = 20.0
+"""Samples per period below which maxima, and windows with them, are placed too coarsely."""
+
+
+def quality(features: FourierFeatures, step: float) -> tuple[float, float]:
+    """Return samples per period and R^2 of a run; NaN where no node oscillates.
+
+    Samples per period are 1 / (Omega step) for the largest frequency Omega over the nodes. The
+    fastest node counts, because V_Omega and V_a compare all nodes: one node that is sampled too
+    coarsely moves the class of the run. R^2 is the median over the nodes of
+    `FourierFeatures.r_squared`, which tells whether a sine describes the run as a whole. A chimera
+    may hold some nodes that are no sines. Constant nodes count for neither.
+
+    Parameters
+    ----------
+    features : FourierFeatures
+    step : float
+        Time between samples.
+    """
+    turning = features.amplitude > 0.0
+    if not turning.any():
+        return float("nan"), float("nan")
+    fastest = float(features.frequency[turning].max())
+    return 1.0 / (fastest * step), float(np.median(features.r_squared[turning]))
