@@ -11,7 +11,6 @@ import contextlib
 import errno
 import os
 import shutil
-import time
 import uuid
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -98,20 +97,24 @@ def remove_leftovers(folder: Path) -> int:
     A temporary file or folder is left over when its process ran on this machine and has ended, or
     when it has not changed for `LEFTOVER_AGE`. Returns the number of deleted entries.
     """
-    count = 0
     with contextlib.suppress(FileNotFoundError):
-        for path in folder.glob(f".*{_SUFFIX}"):
-            if is_leftover(path):
-                _remove(path)
-                count += 1
-    return count
+        found = list(folder.glob(f".*{_SUFFIX}"))
+        now = time_at(folder) if found else 0.0
+        left = [path for path in found if is_leftover(path, now)]
+        for path in left:
+            _remove(path)
+        return len(left)
+    return 0
 
 
-def is_leftover(path: Path) -> bool:
-    """Return whether the writer of a temporary file or folder has abandoned it."""
+def is_leftover(path: Path, now: float) -> bool:
+    """Return whether the writer of a temporary file or folder has abandoned it.
+
+    `now` is the time of the file server's clock (see `time_at`).
+    """
     mark = path.name.removesuffix(_SUFFIX).rpartition(".")[0].rpartition(".")[2]
     try:
-        age = time.time() - path.stat().st_mtime
+        age = now - path.stat().st_mtime
     except FileNotFoundError:
         return False
     return is_gone(mark) or age > LEFTOVER_AGE
@@ -129,6 +132,25 @@ def server_time(folder: Path) -> float:
         return probe.stat().st_mtime
     finally:
         probe.unlink(missing_ok=True)
+
+
+def time_at(folder: Path) -> float:
+    """Return `server_time` or, if nothing can be written, the latest time of a file in `folder`.
+
+    This machine's own clock is never used: if it is fast, files in use would seem old. The latest
+    time of a file is never later than the server's, so no file seems older than it is.
+    """
+    try:
+        return server_time(folder)
+    except OSError:
+        return max((_modified(path) for path in folder.glob("*")), default=0.0)
+
+
+def _modified(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 @contextlib.contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chimera_hpc.base.exits import Exit
+from chimera_hpc.base.files import time_at
 from chimera_hpc.base.status import Status
 from chimera_hpc.cli.arguments import add, flag, store_path
 from chimera_hpc.cli.cell_map import Cells, draw
@@ -116,8 +116,10 @@ def recent_rate(path: Path, scan: LedgerScan, block_size: int) -> float | None:
     ends, seconds, n_points = ends[order], seconds[order], tried[scan.written][order]
     pauses = np.flatnonzero(np.diff(ends) > _PAUSE + 3.0 * seconds[1:])
     recent = slice(int(pauses[-1]) + 1 if len(pauses) else 0, None)
-    span = time.time() - float((ends - seconds)[recent].min())
-    if time.time() - ends[-1] < _PAUSE + 3.0 * seconds.max():
+    # The blocks' times are those of the file server's clock.
+    now = time_at(path / "ledger")
+    span = now - float((ends - seconds)[recent].min())
+    if now - ends[-1] < _PAUSE + 3.0 * seconds.max():
         # A block that is under way counts when it ends.
         span = float(ends[-1] - (ends - seconds)[recent].min())
     return float(n_points[recent].sum() / max(span, 1e-3))

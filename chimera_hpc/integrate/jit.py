@@ -17,7 +17,6 @@ import platform
 import re
 import shutil
 import tempfile
-import time
 import uuid
 from collections.abc import Callable
 from functools import cache
@@ -71,20 +70,19 @@ def cache_folder() -> str:
         folder.mkdir(parents=True, exist_ok=True)
         if os.access(folder, os.W_OK):
             os.utime(folder)
-            _remove_unused(root)
+            _remove_unused(root, before=os.stat(folder).st_mtime - _UNUSED_DAYS * 86400)
             return str(folder)
     except OSError:
         pass
     return tempfile.mkdtemp(prefix="chimera_hpc-numba-")
 
 
-def _remove_unused(root: Path) -> None:
-    """Remove the folders of other digests that have not been used for a long time.
+def _remove_unused(root: Path, before: float) -> None:
+    """Remove the folders of other digests that were last used before a time of the file server.
 
     Each folder is renamed first, so that only one process removes it and no process reads a folder
     that is partly removed.
     """
-    before = time.time() - _UNUSED_DAYS * 86400
     for folder in root.iterdir():
         ours = _OLD.fullmatch(folder.name) and folder.name != source_digest()
         with contextlib.suppress(OSError):

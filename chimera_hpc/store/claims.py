@@ -32,7 +32,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from chimera_hpc.base.files import create_exclusively, server_time
+from chimera_hpc.base.files import create_exclusively, server_time, time_at
 from chimera_hpc.base.processes import is_gone, process_identity
 
 FOLDER = "claims"
@@ -184,17 +184,9 @@ def _highest(folder: Path) -> list[tuple[int, Path, bool]]:
         if match and match["block"].isdecimal():
             block, attempt = int(match["block"]), int(match["attempt"])
             highest[block] = max(highest.get(block, 0), attempt)
-    now = _time_there(folder) if highest else 0.0
+    now = time_at(folder) if highest else 0.0
     paths = {block: _path(folder, block, attempt) for block, attempt in sorted(highest.items())}
     return [(block, path, _is_free(path, now)) for block, path in paths.items()]
-
-
-def _time_there(folder: Path) -> float:
-    """Return the file server's time, or this machine's where nothing can be written."""
-    try:
-        return server_time(folder)
-    except OSError:
-        return time.time()
 
 
 def _content(

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -100,3 +103,44 @@ def test_server_time_is_the_clock_that_stamps_files(tmp_path: Path, monkeypatch:
     path.touch()
     assert abs(files.server_time(tmp_path) - path.stat().st_mtime) < 5
     assert os.listdir(tmp_path) == ["a"]
+
+
+SKEWED = """
+import sys, time
+real = time.time
+time.time = lambda: real() + float(sys.argv[2])
+from pathlib import Path
+from chimera_hpc.base.files import remove_leftovers, time_at
+print(remove_leftovers(Path(sys.argv[1])), time_at(Path(sys.argv[1])) - real())
+"""
+
+
+@pytest.mark.parametrize("ahead", [3700.0, 1e9, -1e9])
+def test_machine_with_a_wrong_clock_deletes_no_fresh_file(tmp_path: Path, ahead: float) -> None:
+    fresh, folder = temporary_name(tmp_path / "c.0.0"), temporary_name(tmp_path / "store.zarr")
+    fresh.touch()
+    folder.mkdir()
+    old = tmp_path / f".c.1.0.other-1-1.0123abcd{files._SUFFIX}"
+    old.touch()
+    os.utime(old, (0, time.time() - files.LEFTOVER_AGE - 60))
+    words = [sys.executable, "-c", SKEWED, str(tmp_path), str(ahead)]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    assert said[0] == "1"
+    assert abs(float(said[1])) < 60
+    assert sorted(tmp_path.iterdir()) == sorted([fresh, folder])
+
+
+def test_without_a_place_to_write_no_file_seems_older_than_it_is(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
+    (tmp_path / "a").touch()
+    os.utime(tmp_path / "a", (5, 5))
+    (tmp_path / "b").touch()
+    os.utime(tmp_path / "b", (7, 7))
+
+    def full(path: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "touch", full)
+    assert files.time_at(tmp_path) == 7
+    assert files.time_at(tmp_path / "missing") == 0
