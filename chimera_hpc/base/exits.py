@@ -12,6 +12,8 @@ class Exit(IntEnum):
     """Some points failed; they are listed."""
     BAD_INPUT = 2
     """Wrong input. One line says what, where and what is allowed."""
+    NO_OUTPUT = 74
+    """What the command prints could not be written, as on a full disk."""
     MORE_TO_DO = 75
     """Stopped in good order (SIGTERM, SIGUSR1, end of a job); the same command continues."""
     INTERRUPTED = 130

@@ -24,6 +24,12 @@ class Status(IntEnum):
         """The outcome in words, for reports and error lists."""
         return _SENTENCES[self]
 
+    def reason(self, steps: int) -> str:
+        """Return the outcome of a point that made so many steps in words."""
+        if self is Status.TIME_OUT and not steps:
+            return _HANG
+        return self.sentence
+
     @property
     def is_result(self) -> bool:
         """Whether the point is finished and has a result."""
@@ -35,6 +41,10 @@ class Status(IntEnum):
         return Status.NON_FINITE <= self <= Status.OUT_OF_MEMORY
 
 
+_HANG = (
+    "time-out: the model did not return within integrator.time_out + run.patience seconds, not one "
+    "step ended"
+)
 _SENTENCES = {
     Status.DONE: "done: it oscillates and its features are in the store",
     Status.STEADY: "steady: the signal stands still, so it has no amplitude, phase or frequency",

@@ -56,12 +56,13 @@ def interrupted(stop: StopRequest, args: Namespace) -> int:
 
 def failures(store: Store, folder: Path, most: int = MOST_LINES) -> Iterator[str]:
     """Yield a line for each failed point, and where the rest is found when there are many."""
-    codes = store.ledger()["status"]
+    ledger = store.ledger()
+    codes, steps = ledger["status"], ledger["steps"]
     failed = np.flatnonzero((codes >= min(_FAILURES)) & (codes <= max(_FAILURES)))
     if len(failed):
         yield f"{len(failed)} points failed:"
     for i in failed[:most].tolist():
-        yield f"  {name_of(store, i)}: {Status(int(codes[i])).sentence}"
+        yield f"  {name_of(store, i)}: {Status(int(codes[i])).reason(int(steps[i]))}"
     if len(failed) > most:
         yield f"  and {len(failed) - most} more: status --failures {shlex.quote(str(folder))}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import warnings
@@ -12,11 +13,13 @@ from typing import Any, NoReturn
 
 from chimera_hpc import __version__
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.places import prepare_home
 from chimera_hpc.base.renaming import IS_RENAMING
+from chimera_hpc.run.watchdog import give_up, watchdog
 
 _EXITS = """exit status:
   0 every point has a result; 1 some failed (listed); 2 bad input (one line);
-  75 stopped in good order with more to do; 130 Ctrl-C
+  74 the output cannot be written; 75 stopped in good order with more to do; 130 Ctrl-C
 """
 
 _INTERRUPTED = 130
@@ -54,20 +57,27 @@ def parser(
     return top
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status; `BadInput` becomes one line and status 2."""
+def main(arguments: Sequence[str] | None = None, program: list[str] | None = None) -> int:
+    """Run one command and return its exit status; `BadInput` becomes one line and status 2.
+
+    `program` is the command line of this process if it runs nothing else: then the command may end
+    the process, or have the program started again in its place, should a model not return.
+    """
     typed = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        return _execute(typed)
+        return _execute(typed, program)
     except KeyboardInterrupt:
         return _INTERRUPTED
 
 
-def _execute(typed: list[str]) -> int:
+def _execute(typed: list[str], program: list[str] | None) -> int:
     from chimera_hpc.base.exits import Exit
 
     args = parser(typed=typed).parse_args(typed)
-    args.typed = typed
+    args.typed, args.program = typed, program
+    if program is not None:
+        watchdog.on_hang = give_up
+        prepare_home()
     args.parser_named = parser
     try:
         with _plain_notes():
@@ -76,8 +86,12 @@ def _execute(typed: list[str]) -> int:
         print(f"error: {error}", file=sys.stderr)
         return Exit.BAD_INPUT
     except BrokenPipeError:
-        sys.stderr.close()
+        # The reader has what it wants, as `head` does.
         return Exit.COMPLETE
+    except OSError as error:
+        where = "the output" if error.filename is None else error.filename
+        print(f"error: {where}: {error.strerror or error}", file=sys.stderr)
+        return Exit.NO_OUTPUT if error.filename is None else Exit.BAD_INPUT
 
 
 @contextmanager
@@ -101,8 +115,23 @@ def _plain_notes() -> Iterator[None]:
 
 def run() -> NoReturn:
     """Run the command line and leave with its exit status."""
-    status = main()
+    status = main(program=sys.orig_argv)
     # A KeyboardInterrupt out of text that Python compiled has it end by SIGINT, although it was
     # caught, until it compiles another one.
     eval("0")
-    sys.exit(status)
+    sys.exit(_with_output(status))
+
+
+def _with_output(status: int) -> int:
+    """Write what is left to be printed; return the exit status, another one if that fails."""
+    from chimera_hpc.base.exits import Exit
+
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        # Python would try again at its end, and print a traceback.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            print(f"error: the output: {error.strerror}", file=sys.stderr)
+            return status or Exit.NO_OUTPUT
+    return status

@@ -70,6 +70,7 @@ def execute(args: Namespace) -> int:
             )
             executor = executor_of(args, store.sweep, path)
             driver = Driver(store, executor, stop, path.parent / "run.log", retry, args.strict)
+            driver.program = args.program
             driver.meanwhile = load_reduction
             driver.work()
             return end(driver, path.parent, args)

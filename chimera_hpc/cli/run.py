@@ -59,6 +59,7 @@ def execute(args: Namespace) -> int:
 
             retry = RetryPolicy(attempts=sweep.run.attempts)
             driver = Driver(store, executor, stop, folder / "run.log", retry, args.strict)
+            driver.program = args.program
             driver.meanwhile = load_reduction
             if not args.no_figures:
                 driver.report = LiveReport(folder, store.n_points)

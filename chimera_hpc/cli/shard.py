@@ -58,6 +58,7 @@ def execute(args: Namespace) -> int:
             log.parent.mkdir(exist_ok=True)
             retry = RetryPolicy(attempts=store.sweep.run.attempts)
             driver = Driver(store, ExecutorChoice("serial", share=share), stop, log, retry)
+            driver.program = args.program
             driver.work()
             return go_on(_end(driver), driver, args.resubmit)
         except BaseException:

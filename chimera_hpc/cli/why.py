@@ -45,7 +45,7 @@ def _explain(store: Store, i: int) -> None:
     ledger = {name: int(column[i]) for name, column in store.ledger().items()}
     status, block = Status(ledger["status"]), i // store.block_size
     print(f"{name_of(store, i)}  (point {i}, block {block})")
-    print(f"  {status.sentence}")
+    print(f"  {status.reason(ledger['steps'])}")
     owner = live_claims(store.path).get(block)
     if owner is not None:
         print(f"  in work now: run {owner.get('run')}, {owner.get('host')}, {owner.get('pid')}")
@@ -94,7 +94,7 @@ def _table(info: Mapping[str, Any], key: str) -> Mapping[str, Any]:
 _HINTS = {
     Status.TIME_OUT: "`retry --status time_out --time-out SECONDS` gives it more time",
     Status.STEP_BUDGET: "`retry --status step_budget --max-steps N` gives it more steps",
-    Status.OUT_OF_MEMORY: "`retry --status out_of_memory --memory SIZE` gives it more memory",
+    Status.OUT_OF_MEMORY: "`retry --status out_of_memory --mem SIZE` gives it more memory",
     Status.WORKER_LOST: "`retry --status worker_lost` tries it again; look into the system's log",
     Status.NON_FINITE: "`retry --status non_finite --set run.tighten=0.01` asks for more accuracy",
     Status.STEP_TOO_SMALL: "integrator.atol may be too small for this point",

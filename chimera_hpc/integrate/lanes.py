@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.foreign import foreign_code
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate import stepper
 from chimera_hpc.integrate.arguments import Lanes, Limits, Method
@@ -186,16 +187,17 @@ class LanePool:
     def run(self) -> float:
         """Call the compiled loop once. Returns its wall time in seconds."""
         began = time.perf_counter()
-        done = self.advance(
-            self.rhs,
-            self.params,
-            self.ints,
-            self.lanes,
-            self.method,
-            self.limits,
-            self.size,
-            self.iterations,
-        )
+        with foreign_code():
+            done = self.advance(
+                self.rhs,
+                self.params,
+                self.ints,
+                self.lanes,
+                self.method,
+                self.limits,
+                self.size,
+                self.iterations,
+            )
         elapsed = time.perf_counter() - began
         if done == self.iterations:
             scale = SLICE / max(elapsed, 1e-6)

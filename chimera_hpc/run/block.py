@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.foreign import foreign_code
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.lanes import Control, Outcome, Stopped, integrate
 from chimera_hpc.integrate.simd import LANES
@@ -24,6 +25,7 @@ from chimera_hpc.measures.quality import quality
 from chimera_hpc.measures.series import by_node, quantise, round_to
 from chimera_hpc.models.protocol import Model
 from chimera_hpc.run.initial_state import initial_state
+from chimera_hpc.run.watchdog import watchdog
 from chimera_hpc.store.block_result import BlockResult, empty_result
 from chimera_hpc.store.schema import MISSING, SCALE, sample_times, series_mask
 
@@ -58,6 +60,7 @@ def run_block(
     lanes: lanes of the stepping loop; chosen from the work by default.
     nudge: how far initial states are moved (see `initial_state`); 0 for a sweep's own points.
     """
+    watchdog.watch(sweep)
     block = _Block(sweep, points, on_signals, nudge)
     with suppress(Stopped):
         for rows in _lane_groups(block.models):
@@ -101,11 +104,12 @@ class _Block:
         n, times = len(points), sample_times(sweep)
         self.sweep, self.times, self.on_signals = sweep, times, on_signals
         rows = [points.row(i) for i in range(n)]
-        self.models = [build(sweep, row) for row in rows]
-        self.initial = [
-            initial_state(sweep, row, model, nudge)
-            for row, model in zip(rows, self.models, strict=True)
-        ]
+        self.models, self.initial = [], []
+        for row in rows:
+            with foreign_code():
+                model = build(sweep, row)
+                self.models.append(model)
+                self.initial.append(initial_state(sweep, row, model, nudge))
         self.options = sweep.features.options()
         self.panel = measures(sweep.measures.panel)
         self.keeps = series_mask(sweep, points.columns["seed"])
@@ -167,7 +171,8 @@ class _Block:
             self.on_signals(row, *model.node_pair(outcome.samples))
         if outcome.status is not Status.DONE:
             return
-        u, w = model.node_pair(outcome.samples)
+        with foreign_code():
+            u, w = model.node_pair(outcome.samples)
         stored = self.stored
         if result.series is not None and self.keeps[row]:
             stored = result.series[row]

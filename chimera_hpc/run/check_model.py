@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.foreign import foreign_code
 from chimera_hpc.base.wording import short
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
@@ -16,6 +17,7 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import build
 from chimera_hpc.models.protocol import Model, Row
 from chimera_hpc.run.initial_state import initial_state
+from chimera_hpc.run.watchdog import watchdog
 
 _config: Any = numba.config  # its attributes are made at run time
 Array = NDArray[np.float64]
@@ -27,10 +29,15 @@ def check_user_model(sweep: Sweep, row: Row) -> None:
     Raises BadInput with what is missing, or of the wrong kind or shape.
     """
     where = f"model: {short(sweep.model)}"
+    watchdog.watch(sweep)
     try:
-        model = build(sweep, row)
-        _check_shapes(sweep, row, model)
-        _check_right_hand_side(model, model.state(*initial_state(sweep, row, model)))
+        with foreign_code():
+            model = build(sweep, row)
+            _check_shapes(sweep, row, model)
+            state = model.state(*initial_state(sweep, row, model))
+        rhs = model.right_hand_side
+        with foreign_code():
+            _check_right_hand_side(model, rhs, state)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
     except Exception as error:
@@ -53,13 +60,13 @@ def _check_shapes(sweep: Sweep, row: Row, model: Model) -> None:
     _expect("second_variable(rows, v0, t)", second.shape, (1, model.n_second))
 
 
-def _check_right_hand_side(model: Model, state: Array) -> None:
+def _check_right_hand_side(model: Model, rhs: Any, state: Array) -> None:
     """Try it on one lane and on `LANES` different ones: each must have the numbers it has alone.
 
     A lane that reads another's parameters, or vector functions that round otherwise than those for
     single numbers, would make results depend on the neighbours.
     """
-    rhs, ints = model.right_hand_side, np.asarray(model.int_params, dtype=np.int64)
+    ints = np.asarray(model.int_params, dtype=np.int64)
     if not (_config.DISABLE_JIT or RIGHT_HAND_SIDE in getattr(rhs, "nopython_signatures", [])):
         raise BadInput(f"right_hand_side is not compiled as {RIGHT_HAND_SIDE}")
     scale = 1.0 + 1e-3 * np.arange(LANES)

@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
@@ -36,11 +36,18 @@ for lanes in (1, LANES):
 """
 
 
-def compile_once(sweep: Sweep, points: Points, *, load: bool) -> None:
+def _say_nothing(text: str) -> None:
+    """Take a line for nobody."""
+
+
+def compile_once(
+    sweep: Sweep, points: Points, *, load: bool, say: Callable[[str], object] = _say_nothing
+) -> None:
     """Compile the kernels that the sweep's points need, unless they are known to be on the disk.
 
     sweep, points: as in `block.warm_up`.
     load: whether this process needs the kernels itself.
+    say: told when there is something to compile.
     """
     spec = sweep.to_dict()
     known = is_compiled(spec)
@@ -48,6 +55,8 @@ def compile_once(sweep: Sweep, points: Points, *, load: bool) -> None:
         return
     from chimera_hpc.run.block import warm_up
 
+    if not known:
+        say("compiling kernels (once, about 30 s)")
     if not known and usable_cores() > 1:
         _compile_in_two_processes(sweep, points)
     warm_up(sweep, points)
@@ -66,7 +75,11 @@ def _compile_in_two_processes(sweep: Sweep, points: Points) -> None:
 
     none = subprocess.DEVNULL
     command = [sys.executable, "-c", _STEPPING_LOOPS]
-    with subprocess.Popen(command, stdin=none, stdout=none, stderr=none) as process:
+    try:
+        second = subprocess.Popen(command, stdin=none, stdout=none, stderr=none)
+    except OSError:
+        return
+    with second as process:
         try:
             warm_up_features(sweep, build(sweep, points.row(0)))
         except BaseException:
@@ -77,10 +90,9 @@ def _compile_in_two_processes(sweep: Sweep, points: Points) -> None:
 def is_compiled(spec: Mapping[str, Any]) -> bool:
     """Return whether the kernels that were there after a sweep's compilation are there still.
 
-    `spec` is what `Sweep.to_dict` returns. A user's own model may be edited at any time: False.
+    `spec` is what `Sweep.to_dict` returns. The right-hand side of a user's own model is not among
+    them: each process compiles it for itself.
     """
-    if ":" in spec["model"]:
-        return False
     try:
         return set(json.loads(_record(spec).read_bytes())) <= set(_kernels())
     except (OSError, ValueError, TypeError):

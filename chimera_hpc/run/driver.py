@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -16,6 +18,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.run.progress import Reporter
 from chimera_hpc.run.signals import StopRequest
 from chimera_hpc.run.slurm.walltime import NEAR, time_to_leave
+from chimera_hpc.run.watchdog import watchdog
 from chimera_hpc.store.claims import live_claims
 from chimera_hpc.store.ledger import RESULTS, unfinished
 from chimera_hpc.store.provenance import differences, gather
@@ -30,6 +33,8 @@ _CLUSTER_TRIES = 3
 _BLOCK_TRIES = 3
 """Errors of the operating system after which a block is left for a later run."""
 _LONGEST_WAIT = 10.0
+_FIRST_RUN = "CHIMERA_HPC_FIRST_RUN"
+"""Environment variable of a process that goes on for another one: the number of that one's run."""
 _RUNS_COMPARED = 20
 
 
@@ -64,6 +69,8 @@ class Driver:
         """Written again from time to time while the work goes on, if given."""
         self.meanwhile: Callable[[], object] | None = None
         """What to do in a thread while workers start, if given."""
+        self.program: list[str] | None = None
+        """The command line of this process, if it runs nothing else."""
 
     def work(self) -> None:
         """Do what is left of the store until nothing is left, or to stop."""
@@ -134,16 +141,38 @@ class Driver:
         say(f"run {run}: {n_blocks} of {store.n_blocks} blocks to do, {kind}, in {store.path}")
         if self.executor.compiles_here:
             began = time.perf_counter()
-            compile_once(store.sweep, store.points, load=kind == "serial")
+            compile_once(store.sweep, store.points, load=kind == "serial", say=say)
             self.reporter.note(f"kernels ready after {time.perf_counter() - began:.1f} s")
-        self.retry = self.retry.of_run(run)
+        # A process that took the place of another one does not retry what that one has tried.
+        self.retry = self.retry.of_run(int(os.environ.pop(_FIRST_RUN, run)))
         return RunMessage(store.path, run, self.retry, process_identity())
 
     def _serial(self, message: RunMessage) -> None:
         from chimera_hpc.run.executors import run_serial
 
-        for blocks in self._rounds():
-            run_serial(message, self._in_time(blocks), self._receiver(message), self.should_stop)
+        before, watchdog.on_hang = watchdog.on_hang, lambda text: self._start_again(text, message)
+        try:
+            for blocks in self._rounds():
+                run_serial(
+                    message, self._in_time(blocks), self._receiver(message), self.should_stop
+                )
+        finally:
+            watchdog.on_hang = before
+
+    def _start_again(self, text: str, message: RunMessage) -> None:
+        """Have the same command in the place of this process, whose model does not return."""
+        from chimera_hpc.run.work import blame_model
+
+        blame_model()
+        self._record(message)
+        if self.program is None:
+            self.reporter.say(f"{text}; the same command in another process goes on without it")
+            return
+        self.reporter.say(f"{text}: this command starts again and goes on")
+        self.reporter.close()
+        sys.stdout.flush()
+        first = min(self.retry.before, message.run)
+        os.execve(sys.executable, self.program, {**os.environ, _FIRST_RUN: str(first)})
 
     def _on_cluster(self, message: RunMessage) -> None:
         from chimera_hpc.run.executors import ClusterLost

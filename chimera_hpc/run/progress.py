@@ -26,7 +26,7 @@ class Reporter:
         self._counted = 0
         # The clock of the rate starts with the first block: workers take a while to come up.
         self._began: float | None = None
-        self._last_line = time.monotonic()
+        self._started = self._last_line = time.monotonic()
         self._stream = stream or sys.stderr
         self._log = log.open("a", encoding="utf-8") if log is not None else None
         self._bar: Progress | None = None
@@ -50,9 +50,9 @@ class Reporter:
                 BarColumn(),
                 MofNCompleteColumn(),
                 TextColumn("{task.fields[rate]}"),
-                TextColumn("left"),
+                TextColumn("ETA"),
                 TimeRemainingColumn(),
-                TextColumn("after"),
+                TextColumn("elapsed"),
                 TimeElapsedColumn(),
                 console=Console(file=self._stream),
             )
@@ -66,6 +66,10 @@ class Reporter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Take the bar away and close the log."""
+        self.close()
+
+    def close(self) -> None:
         """Take the bar away and close the log."""
         if self._bar is not None:
             self._bar.stop()
@@ -116,5 +120,13 @@ class Reporter:
             failures = f", {self.failed} failed" if self.failed else ""
             self.say(
                 f"{self.done} of {self.total} points{failures}, {rate:.1f} points/s, "
-                f"{left:.0f} s to go"
+                f"elapsed {duration(now - self._started)}, ETA {duration(left)}"
             )
+
+
+def duration(seconds: float) -> str:
+    """Return a time as hours, minutes and seconds, or with days before them: ``1 d 02:03:04``."""
+    minutes, s = divmod(round(seconds), 60)
+    hours, m = divmod(minutes, 60)
+    days, h = divmod(hours, 24)
+    return (f"{days} d " if days else "") + f"{h:02}:{m:02}:{s:02}"

@@ -24,6 +24,7 @@ from chimera_hpc.job import Points
 from chimera_hpc.run.block import run_block
 from chimera_hpc.run.messages import BlockError, BlockReceipt, RunMessage, tell_to_stop
 from chimera_hpc.run.slurm import walltime
+from chimera_hpc.run.watchdog import limit_of
 from chimera_hpc.store.block_result import BlockResult, failed_block
 from chimera_hpc.store.claims import Claim, ClaimLost, LostAttempt, claim_block, forget_points
 from chimera_hpc.store.ledger import METADATA
@@ -94,6 +95,12 @@ def blame_memory() -> None:
     """Leave word at the blocks in hand that this process is being ended for its use of memory."""
     for claim in _in_hand:
         claim.blame_memory()
+
+
+def blame_model() -> None:
+    """Leave word at the blocks in hand that this process is being ended: its model hangs."""
+    for claim in _in_hand:
+        claim.blame_model()
 
 
 def is_busy() -> bool:
@@ -216,15 +223,25 @@ class _Block:
         with self._claimed(f"{self.block}_{rows[0]}") as own:
             deaths = self._deaths(own)
             tries = before + len(deaths)
-            if len(deaths) < self.sweep.run.attempts:
+            hangs = bool(deaths) and deaths[-1].no_return
+            result: BlockResult | None
+            if hangs or len(deaths) >= self.sweep.run.attempts:
+                result = self._failed(self._points(rows), deaths[-1])
+            else:
                 result = self._compute(rows, claim, own)
                 tries += 1
-            else:
-                memory = deaths[-1].out_of_memory
-                status = Status.OUT_OF_MEMORY if memory else Status.WORKER_LOST
-                result = failed_block(self.sweep, self._points(rows), status)
             _end(own, result is None or bool((result.status != Status.NEVER).all()))
         return result, tries
+
+    def _failed(self, points: Points, death: LostAttempt) -> BlockResult:
+        """Return the result of a point that its workers died of."""
+        if death.no_return:
+            result = failed_block(self.sweep, points, Status.TIME_OUT)
+            result.elapsed_us[:] = int(1e6 * limit_of(self.sweep))
+            return result
+        memory = death.out_of_memory
+        status = Status.OUT_OF_MEMORY if memory else Status.WORKER_LOST
+        return failed_block(self.sweep, points, status)
 
     def _points(self, rows: Rows) -> Points:
         return self.store.points[self.store.block(self.block)[0] + rows]
@@ -237,7 +254,9 @@ class _Block:
         return [
             lost
             for lost in claim.lost
-            if lost.out_of_memory or (not lost.handed_back and self._died_by_itself(lost))
+            if lost.out_of_memory
+            or lost.no_return
+            or (not lost.handed_back and self._died_by_itself(lost))
         ]
 
     def _died_by_itself(self, lost: LostAttempt) -> bool:
@@ -249,7 +268,7 @@ class _Block:
 def _tries_together(deaths: Sequence[LostAttempt]) -> tuple[int, bool]:
     """Return how many attempts were made on the whole block, and whether no more of them are."""
     for count, death in enumerate(deaths, start=1):
-        if count == LOSSES_BEFORE_SPLIT or death.out_of_memory:
+        if count == LOSSES_BEFORE_SPLIT or death.out_of_memory or death.no_return:
             return count, True
     return len(deaths), False
 

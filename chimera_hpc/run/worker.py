@@ -15,6 +15,7 @@ from distributed import WorkerPlugin
 
 from chimera_hpc.run.fork_server import BLOCKED
 from chimera_hpc.run.slurm.walltime import WORKER, leaving, time_to_leave
+from chimera_hpc.run.watchdog import say, watchdog
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -52,6 +53,7 @@ class SignalPlugin(WorkerPlugin):
             signal.signal(number, signal.SIG_DFL)
             os.kill(os.getpid(), number)
 
+        watchdog.on_hang = _end_at_once
         _on(signal.SIGINT, signal.SIG_IGN)
         if WORKER in os.environ:
             _leave_in_time(worker)
@@ -61,6 +63,15 @@ class SignalPlugin(WorkerPlugin):
     def teardown(self, worker: Worker) -> None:
         """Spare the end of the process the look through everything for garbage."""
         gc.freeze()
+
+
+def _end_at_once(text: str) -> None:
+    """End this process, whose model does not return; its nanny starts another one."""
+    from chimera_hpc.run.work import blame_model
+
+    blame_model()
+    say(text)
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _drop_work() -> None:

@@ -38,7 +38,7 @@ from chimera_hpc.base.processes import is_gone, process_identity
 FOLDER = "claims"
 EXPIRY = 60.0
 """Seconds without a heartbeat after which a claim is free; kernels return to Python every 0.5 s."""
-_HANDED_BACK, _OUT_OF_MEMORY = 0, 1
+_HANDED_BACK, _OUT_OF_MEMORY, _NO_RETURN = 0, 1, 2
 """Heartbeats, long expired, by which an owner's last word reaches the next one."""
 _NAME = re.compile(r"(?P<block>\w+)\.(?P<attempt>[1-9]\d*)\.json", re.ASCII)
 
@@ -57,6 +57,8 @@ class LostAttempt:
     """Whether its owner lived to say that it gave up; else the process was lost."""
     out_of_memory: bool
     """Whether its owner could still say that it was ended for its use of memory."""
+    no_return: bool
+    """Whether its owner could still say that a call of the model did not return."""
     info: Mapping[str, Any]
     """The contents of the claim file; empty when unreadable."""
 
@@ -111,6 +113,11 @@ class Claim:
         """Leave word that this process is being ended because it uses too much memory."""
         with contextlib.suppress(OSError):
             os.utime(self.path, (_OUT_OF_MEMORY, _OUT_OF_MEMORY))
+
+    def blame_model(self) -> None:
+        """Leave word that this process is being ended because the model does not return."""
+        with contextlib.suppress(OSError):
+            os.utime(self.path, (_NO_RETURN, _NO_RETURN))
 
 
 def claim_block(
@@ -229,7 +236,13 @@ def _lost(folder: Path, block: int | str, attempt: int) -> LostAttempt:
         word = path.stat().st_mtime
     except FileNotFoundError:
         word = -1.0
-    return LostAttempt(attempt, word == _HANDED_BACK, word == _OUT_OF_MEMORY, _read(path))
+    return LostAttempt(
+        attempt,
+        handed_back=word == _HANDED_BACK,
+        out_of_memory=word == _OUT_OF_MEMORY,
+        no_return=word == _NO_RETURN,
+        info=_read(path),
+    )
 
 
 def _read(path: Path) -> dict[str, Any]:

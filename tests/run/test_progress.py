@@ -37,9 +37,9 @@ def test_plain_lines_come_at_intervals_and_at_the_end(monkeypatch: pytest.Monkey
     lines = stream.getvalue().splitlines()
     # Every 10 s: after 12, 24 and, at the end, 32 s.
     assert lines == [
-        "50 of 100 points, 4 failed, 2.5 points/s, 20 s to go",
-        "80 of 100 points, 7 failed, 2.5 points/s, 8 s to go",
-        "100 of 100 points, 9 failed, 2.5 points/s, 0 s to go",
+        "50 of 100 points, 4 failed, 2.5 points/s, elapsed 00:00:12, ETA 00:00:20",
+        "80 of 100 points, 7 failed, 2.5 points/s, elapsed 00:00:24, ETA 00:00:08",
+        "100 of 100 points, 9 failed, 2.5 points/s, elapsed 00:00:32, ETA 00:00:00",
     ]
 
 
@@ -51,7 +51,14 @@ def test_no_time_to_go_is_told_before_any_point_is_done(monkeypatch: pytest.Monk
         for n_done in (0, 4):
             now += 20.0
             reporter.add(n_done, 0)
-    assert stream.getvalue().splitlines() == ["4 of 8 points, 0.2 points/s, 20 s to go"]
+    assert stream.getvalue().splitlines() == [
+        "4 of 8 points, 0.2 points/s, elapsed 00:00:40, ETA 00:00:20"
+    ]
+
+
+def test_durations_have_days_when_they_need_them() -> None:
+    assert progress.duration(59.7) == "00:01:00"
+    assert progress.duration(2 * 86400 + 3 * 3600 + 4 * 60 + 5) == "2 d 03:04:05"
 
 
 def test_log_gets_every_line_with_its_time(tmp_path: Path) -> None:

@@ -81,6 +81,8 @@ def die(store: Store, name: int | str = 0, times: int = 1, **options: Any) -> No
         gone(claim, options.get("driver", "somebody"))
         if options.get("memory"):
             claim.blame_memory()
+        if options.get("hang"):
+            claim.blame_model()
 
 
 def is_bad(points: Points, seed: int = 2) -> bool:
@@ -269,6 +271,29 @@ def test_point_that_died_of_memory_is_out_of_memory(store: Store, compute: Any) 
     assert sizes == [1, 1, 1]
     assert status_of(store) == [1, 1, Status.OUT_OF_MEMORY, 1]
     assert store.ledger()["attempts"][:4].tolist() == [2, 2, 3, 2]
+
+
+def test_block_whose_model_did_not_return_is_done_point_by_point_at_once(
+    store: Store, compute: Any
+) -> None:
+    die(store, hang=True)
+    sizes = compute(lambda sweep, points, _: done(sweep, points))
+    do_block(message(store), 0)
+    assert sizes == [1, 1, 1, 1]
+
+
+def test_point_that_did_not_return_alone_has_timed_out(store: Store, compute: Any) -> None:
+    # Also when its driver had to end with it.
+    die(store, hang=True, driver="")
+    die(store, "0_2", hang=True, driver="")
+    sizes = compute(lambda sweep, points, _: done(sweep, points))
+    do_block(message(store, run=2), 0)
+    assert sizes == [1, 1, 1]
+    assert status_of(store) == [1, 1, Status.TIME_OUT, 1]
+    limit = store.sweep.integrator.time_out + store.sweep.run.patience
+    assert store.ledger()["elapsed_us"][2] == 1e6 * limit
+    assert store.ledger()["attempts"][:4].tolist() == [2, 2, 2, 2]
+    assert os.listdir(store.path / "claims") == []
 
 
 def test_workers_that_died_with_their_driver_say_nothing_of_the_points(
