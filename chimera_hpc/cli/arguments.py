@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.renaming import warn
 from chimera_hpc.base.wording import short
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.models import parameters_of
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from chimera_hpc.store.store import Store
 
 STORE = "store.zarr"
-_SIZE = re.compile(r"[1-9][0-9]{0,9}([kMGT]i?)?B", re.ASCII)
+_SIZE = re.compile(r"([1-9][0-9]{0,9}[KMGT]?)(i?B)?", re.ASCII | re.IGNORECASE)
 
 
 @contextmanager
@@ -50,6 +51,14 @@ def folder_name(text: str) -> Path:
     return Path(text)
 
 
+def memory_size(text: str) -> str:
+    """Return a size as SLURM writes it: 2G for 2G, 2GB and 2GiB."""
+    found = _SIZE.fullmatch(text)
+    if found is None or (found[2] and found[1].isdigit()):
+        raise ArgumentTypeError(f"{short(text)}: a size such as 800M or 2G is needed")
+    return found[1].upper()
+
+
 def flag(text: str) -> dict[str, Any]:
     """Return an option without a value, as `ArgumentParser.add_argument` takes it."""
     return {"action": "store_true", "help": text}
@@ -69,7 +78,10 @@ _CLUSTER = (
 _RESUBMIT = "go on up to N times, as the same SLURM job, when its time limit stopped it"
 _STRICT = "refuse to go on with other code, libraries or processors than the results there have"
 _JOB = "the job file; quickstart, paper/plane and others come with the package"
-_MEMORY = "memory at which a local worker is ended, e.g. 2GB (default: a fair share)"
+_MEMORY = (
+    "memory of a worker, e.g. 800M or 2G: a local one is ended beyond it (default: a fair share), "
+    "SLURM is asked for it (default: 1G)"
+)
 _SHARED = {
     "job": value("JOB.toml", job_file, _JOB),
     "folder": value("DIR", Path, "the sweep's folder"),
@@ -82,7 +94,8 @@ _SHARED = {
     "--cluster": {"default": "local", "choices": CLUSTERS, "help": _CLUSTER},
     "--scheduler-file": value("FILE", Path, "file that its scheduler wrote"),
     "--workers": value("N", int, "worker processes (default: one per core)"),
-    "--memory": value("SIZE", str, _MEMORY),
+    "--mem": value("SIZE", memory_size, _MEMORY),
+    "--memory": value("SIZE", memory_size, SUPPRESS),
     "--resubmit": value("N", int, _RESUBMIT, default=0),
     "--no-figures": flag("results.json, but no figures and no report"),
     "--strict": flag(_STRICT),
@@ -91,10 +104,9 @@ _SLURM = {
     "--partition": value("NAME", str, "partition of the jobs"),
     "--account": value("NAME", str, "account that they are charged to"),
     "--time": value("LIMIT", str, "time limit of a job, e.g. 30 or 1-12:00:00"),
-    "--mem": value("SIZE", str, "memory of a worker, e.g. 800M or 2G"),
     "--interface": value("NAME", str, "network of scheduler and workers"),
 }
-EXECUTOR = ("--cluster", "--scheduler-file", "--workers", "--memory")
+EXECUTOR = ("--cluster", "--scheduler-file", "--workers", "--mem", "--memory")
 """Arguments for where the work is done."""
 
 
@@ -164,8 +176,9 @@ def executor_of(args: Namespace, sweep: Sweep, store: Path) -> ExecutorChoice:
         raise BadInput(
             f"{args.scheduler_file}: no such file; dask scheduler --scheduler-file makes it"
         )
-    if args.memory is not None and not _SIZE.fullmatch(args.memory):
-        raise BadInput(f"--memory {args.memory}: a size such as 800MB or 2GB is needed")
+    if args.memory is not None:
+        warn("--memory", "--mem")
+        args.mem = args.mem or args.memory
     workers = args.workers or sweep.run.workers
     slurm_options = (
         slurm_options_of(args, sweep) if args.cluster in ("slurm", "allocation") else None
@@ -174,7 +187,7 @@ def executor_of(args: Namespace, sweep: Sweep, store: Path) -> ExecutorChoice:
         from chimera_hpc.run.slurm.workers import check_options
 
         check_options(slurm_options, store)
-    return ExecutorChoice(args.cluster, workers, args.scheduler_file, args.memory, slurm_options)
+    return ExecutorChoice(args.cluster, workers, args.scheduler_file, args.mem, slurm_options)
 
 
 def start_early(args: Namespace) -> None:

@@ -44,7 +44,7 @@ reduces.
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add(parser, "job", "--set", "--out", "--block", "--yes", "--resubmit")
+    add(parser, "job", "--set", "--out", "--block", "--yes", "--mem", "--resubmit")
     mode = "which way (default: array)"
     parser.add_argument("--mode", choices=MODES, default="array", help=mode)
     add_slurm(parser)

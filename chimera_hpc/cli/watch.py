@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import select
+import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
@@ -62,7 +64,20 @@ def _follow(view: _View, every: float) -> int:
             last = line
         if view.over:
             return view.exit_status
-        time.sleep(every)
+        _wait(every)
+
+
+def _wait(seconds: float) -> None:
+    """Wait; raise BrokenPipeError when nothing reads the output any more."""
+    try:
+        output = sys.stdout.fileno()
+    except OSError:
+        time.sleep(seconds)
+        return
+    poll = select.poll()
+    poll.register(output, 0)
+    if poll.poll(1e3 * seconds):
+        raise BrokenPipeError
 
 
 class _View:

@@ -10,6 +10,7 @@ numba is loaded when the first kernel is declared. The path of the cache is know
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import hashlib
 import os
@@ -18,16 +19,20 @@ import re
 import shutil
 import tempfile
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from chimera_hpc.base.places import home_folder, is_writable, private_folder
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("integrate", "models", "measures", "classify")
 _UNUSED_DAYS = 30
+_KERNEL_BYTES = 32_000_000
+"""Room for all kernels, which take 11 MB, and for those that replace them."""
 _OLD = re.compile(r"[0-9a-f]{16}(\.[0-9a-f]{32}\.old)?")
 """Name of a cache folder, or of one whose removal was interrupted."""
 
@@ -59,22 +64,45 @@ def cache_folder() -> str:
     """Folder of the compiled kernels.
 
     It is in ``$NUMBA_CACHE_DIR`` if set (a cluster job sets it to a node-local folder), else in the
-    user's cache folder, or in a temporary folder if that one is not writable. Folders of other
-    sources next to it are removed if no process has used them for `_UNUSED_DAYS` days.
+    user's cache folder. If no kernels can be written there, it is in the user's `private_folder`,
+    and as a last resort in a folder that this process and those that it starts share, and that is
+    removed at its end. Folders of other sources next to it are removed if no process has used them
+    for `_UNUSED_DAYS` days.
     """
+    with contextlib.suppress(OSError):
+        for root in _roots():
+            folder = root / source_digest()
+            if is_writable(folder) and _has_room(folder):
+                os.utime(folder)
+                _remove_unused(root, before=folder.stat().st_mtime - _UNUSED_DAYS * 86400)
+                return str(folder)
+    last = tempfile.mkdtemp(prefix="chimera_hpc-numba-")
+    os.environ["NUMBA_CACHE_DIR"] = last
+    atexit.register(_remove_of, os.getpid(), last)
+    (Path(last) / source_digest()).mkdir()
+    return str(Path(last) / source_digest())
+
+
+def _roots() -> Iterator[Path]:
     base = os.environ.get("NUMBA_CACHE_DIR")
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    root = Path(base) if base else Path(home) / "chimera_hpc" / "numba"
-    folder = root / source_digest()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            os.utime(folder)
-            _remove_unused(root, before=os.stat(folder).st_mtime - _UNUSED_DAYS * 86400)
-            return str(folder)
-    except OSError:
-        pass
-    return tempfile.mkdtemp(prefix="chimera_hpc-numba-")
+    home = os.environ.get("XDG_CACHE_HOME")
+    if base:
+        yield Path(base)
+    else:
+        yield (Path(home) if home else home_folder() / ".cache") / "chimera_hpc" / "numba"
+    yield private_folder() / "numba"
+
+
+def _has_room(folder: Path) -> bool:
+    """Return whether all kernels fit on the disk, or some were written before."""
+    disk = os.statvfs(folder)
+    return disk.f_bavail * disk.f_frsize > _KERNEL_BYTES or any(folder.glob("*/*.nbc"))
+
+
+def _remove_of(pid: int, folder: str) -> None:
+    """Remove a folder at the end of the process that made it, not of one forked from it."""
+    if os.getpid() == pid:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove_unused(root: Path, before: float) -> None:

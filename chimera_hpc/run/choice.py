@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chimera_hpc.run.local_cluster import existing_cluster, local_cluster
+from chimera_hpc.run.local_cluster import dask_size, existing_cluster, local_cluster
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -29,7 +29,7 @@ class ExecutorChoice:
     workers: int = 0
     scheduler_file: Path | None = None
     memory: str | None = None
-    """Limit per worker, as `800MB`."""
+    """Memory of a worker, as `800M`."""
     slurm_options: Slurm | None = None
     """What is asked of SLURM."""
     share: tuple[int, int] | None = None
@@ -72,7 +72,7 @@ class ExecutorChoice:
             with existing_cluster(self.scheduler_file, patience=patience) as client:
                 yield client, _no_more
         else:
-            limit = self.memory or "auto"
+            limit = dask_size(self.memory) if self.memory else "auto"
             with local_cluster(
                 self.workers, patience=patience, memory_limit=limit, meanwhile=meanwhile
             ) as client:

@@ -60,6 +60,11 @@ def settings(patience: float = 60.0) -> dict[str, Any]:
     }
 
 
+def dask_size(size: str) -> str:
+    """Return a size that is written as for SLURM, where 800 means 800M, as Dask reads it."""
+    return f"{size}MiB" if size[-1].isdigit() else f"{size}iB"
+
+
 @contextmanager
 def local_cluster(
     workers: int,

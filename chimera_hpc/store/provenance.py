@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import getpass
 import os
 import platform
 import re
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc import __version__
+from chimera_hpc.base.places import user_name
 
 PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "zarr", "dask", "distributed", "scikit-learn")
@@ -56,7 +56,7 @@ def gather(model: str = "") -> dict[str, Any]:
             "cores": os.cpu_count(),
             "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         },
-        "user": _user(),
+        "user": user_name(),
         "process": os.getpid(),
         "command": list(sys.argv),
         "folder": os.getcwd(),
@@ -156,10 +156,3 @@ def _version_of(name: str) -> str | None:
         return version(name)
     except PackageNotFoundError:
         return None
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError, ImportError):
-        return str(os.getuid())

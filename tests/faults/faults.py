@@ -194,7 +194,7 @@ def kills_its_worker(trial: Trial) -> Finding:
 @fault("a point that needs more memory than there is")
 def hits_memory_limit(trial: Trial) -> Finding:
     # Once with its block, twice alone.
-    return _misbehave(trial, "memory", options=("--memory", "700MB"), deaths=3)
+    return _misbehave(trial, "memory", options=("--mem", "700M"), deaths=3)
 
 
 def _misbehave(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job.tables import Slurm
-from chimera_hpc.run.local_cluster import LOOPBACK, NO_DASHBOARD, settings
+from chimera_hpc.run.local_cluster import LOOPBACK, NO_DASHBOARD, dask_size, settings
 from chimera_hpc.run.slurm.queue import KERNELS, is_of_this_node
 from chimera_hpc.run.slurm.script import LOGS, MEMORY, environment_lines, job_name
 from chimera_hpc.run.slurm.tls import fresh_certificate
@@ -77,10 +77,9 @@ def _workers(store: Path, address: list[str], slurm_options: Slurm, log: Path) -
     step = ["srun", f"--mem-per-cpu={memory}", "--kill-on-bad-exit=0", "--cpus-per-task=1"]
     nodes = os.environ.get("SLURM_JOB_NUM_NODES", "1")
     compile_once = [*step, f"--nodes={nodes}", f"--ntasks={nodes}", "--ntasks-per-node=1"]
-    limit = memory + ("" if memory[-1].isdigit() else "iB")
     worker = [
         *(sys.executable, "-m", "distributed.cli.dask_worker", *address),
-        *("--nthreads", "1", "--memory-limit", limit, "--death-timeout", "60"),
+        *("--nthreads", "1", "--memory-limit", dask_size(memory), "--death-timeout", "60"),
         *NO_DASHBOARD,
         *(["--interface", slurm_options.interface] if slurm_options.interface else []),
     ]

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.places import home_folder
 from chimera_hpc.job.reading import one_line, parse_toml, read_text
 from chimera_hpc.job.tables import Slurm, unknown_key
 
@@ -20,7 +21,7 @@ _TABLE = "slurm"
 
 def user_file() -> Path:
     """Return the file with the user's own defaults, which need not exist."""
-    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    base = os.environ.get("XDG_CONFIG_HOME") or home_folder() / ".config"
     return Path(base) / "chimera_hpc" / "config.toml"
 
 

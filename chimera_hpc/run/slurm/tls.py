@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import create_exclusively
+from chimera_hpc.base.places import home_folder
 from chimera_hpc.base.processes import is_gone, process_identity
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def remove_left_over(store: Path, cancelled: Collection[str] = ()) -> list[Path]
 
 def home() -> Path:
     """Return the folder of the certificates' folders."""
-    return Path(os.environ.get(PRIVATE) or Path.home() / ".chimera_hpc")
+    return Path(os.environ.get(PRIVATE) or home_folder() / ".chimera_hpc")
 
 
 def _is_alive_here(mark: str) -> bool:

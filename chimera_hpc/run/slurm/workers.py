@@ -8,7 +8,6 @@ itself puts back into the queue is waited for.
 from __future__ import annotations
 
 import asyncio
-import getpass
 import logging
 import signal
 import socket
@@ -23,8 +22,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.places import user_name
 from chimera_hpc.job.tables import Slurm
-from chimera_hpc.run.local_cluster import LOOPBACK, NO_DASHBOARD, settings
+from chimera_hpc.run.local_cluster import LOOPBACK, NO_DASHBOARD, dask_size, settings
 from chimera_hpc.run.slurm import queue
 from chimera_hpc.run.slurm.queue import SlurmFailed
 from chimera_hpc.run.slurm.script import (
@@ -203,7 +203,7 @@ def tunnel(scheduler: Any) -> str:
     """Return how to reach the dashboard, which listens on loopback only."""
     port = scheduler.services["dashboard"].port if "dashboard" in scheduler.services else None
     port = port or scheduler.http_server.port
-    here = f"{getpass.getuser()}@{socket.gethostname()}"
+    here = f"{user_name()}@{socket.gethostname()}"
     return f"dashboard: ssh -N -L 8787:{LOOPBACK}:{port} {here}, then http://localhost:8787/status"
 
 
@@ -231,7 +231,7 @@ def _cluster(slurm_options: Slurm, name: str, store: Path, certificate: Certific
         job_cls=job,
         cores=1,
         processes=1,
-        memory=memory if memory[-1].isdigit() else f"{memory}iB",
+        memory=dask_size(memory),
         job_mem=memory,
         walltime=slurm_options.time or TIME,
         queue=slurm_options.partition,
