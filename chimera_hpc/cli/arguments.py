@@ -227,10 +227,7 @@ def sweep_folder(out: Path | None, sweep: Sweep) -> Path:
 
 
 def store_path(folder: Path) -> Path:
-    """Return the store in a sweep's folder.
-
-    Raises BadInput when there is none.
-    """
+    """Return the store in a sweep's folder. Raises BadInput when there is none."""
     store = folder if (folder / "zarr.json").is_file() else folder / STORE
     if not store.is_dir():
         raise BadInput(f"{folder}: not a sweep's folder: it holds no {STORE}")

@@ -110,10 +110,7 @@ def load(place: str) -> Any:
 
 
 def method(name: str) -> Tableau:
-    """Return the Runge-Kutta pair of this name.
-
-    Raises BadInput: the pair was removed.
-    """
+    """Return the Runge-Kutta pair of this name. Raises BadInput: the pair was removed."""
     if name in REMOVED_METHODS:
         instead = REMOVED_METHODS[name]
         raise BadInput(f'method "{name}" was removed in version 0.2: use "{instead}"')

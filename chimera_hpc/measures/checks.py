@@ -47,10 +47,7 @@ def node_rows(name: str, values: ArrayLike) -> Array:
 
 
 def integer(name: str, value: int) -> int:
-    """Return the value as int.
-
-    Raises BadInput: the value is not a whole number.
-    """
+    """Return the value as int. Raises BadInput: the value is not a whole number."""
     try:
         return operator.index(value)
     except TypeError as error:
