@@ -31,7 +31,6 @@ class Command:
 
     @property
     def module(self) -> Module:
-        """The module of the command."""
         return cast(Module, import_module(f"{__name__}.{self.name}"))
 
 

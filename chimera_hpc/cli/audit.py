@@ -31,7 +31,6 @@ _SHARE = 0.05
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(
         parser,
         *("folder", "--json"),
@@ -44,7 +43,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Audit a sweep, then draw its figures and its report again."""
     sample = _sample(args)
     workers = usable_cores() if args.workers is None else args.workers
     if workers < 0:

@@ -20,12 +20,10 @@ What they have done stays, and `run` or another job goes on from there.
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(parser, "folder")
 
 
 def execute(args: Namespace) -> int:
-    """Cancel the jobs."""
     store = store_path(args.folder.absolute())
     try:
         jobs = queue.jobs(job_name(store))

@@ -142,7 +142,6 @@ class Mark(NamedTuple):
 
     @property
     def style(self) -> str:
-        """Its colours."""
         if self.name is None:
             return _STYLES[self.state]
         return _STYLES.get(self.name.split("-")[0], _OTHER_STYLE)

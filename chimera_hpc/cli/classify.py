@@ -35,7 +35,6 @@ of pickled objects are refused.
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     rescale = "find those factors: median frequency and amplitude become those of the atlas's runs"
     setting = "a setting of the table [features], e.g. n_peaks=5; may be repeated"
     along = "what to take along another dimension (NetCDF, Zarr); may be repeated"
@@ -73,7 +72,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Classify a recording."""
     if args.bridge < 0:
         raise BadInput(f"--bridge {args.bridge}: allowed is 0 or more")
     if args.rescale and args.atlas is None:

@@ -21,12 +21,10 @@ SHELLS = ("bash", "zsh")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     parser.add_argument("shell", choices=SHELLS, help="the shell")
 
 
 def execute(args: Namespace) -> int:
-    """Print the script."""
     try:
         import shtab
     except ModuleNotFoundError:

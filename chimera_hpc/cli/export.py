@@ -27,7 +27,6 @@ EPILOG = """examples:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(
         parser,
         "folder",
@@ -37,7 +36,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Export a sweep."""
     if args.series and args.to.suffix != ".nc":
         raise BadInput(f"--series: only for .nc, not for {args.to.name}")
     writer = _writer(args.to)

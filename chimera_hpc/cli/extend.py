@@ -19,12 +19,10 @@ computes them.
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(parser, "job", "--set", "--out", "--yes")
 
 
 def execute(args: Namespace) -> int:
-    """Extend the store of a sweep."""
     sweep = load_job(args.job, args.overrides)
     folder = sweep_folder(args.out, sweep)
     path = store_path(folder)

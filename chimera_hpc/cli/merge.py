@@ -24,13 +24,11 @@ for it; where their results differ it is listed, and the exit status is 1.
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     parser.add_argument("folders", **value("DIR", Path, "folders of sweeps", nargs="+"))
     add(parser, out=value("DIR", folder_name, "the new folder", required=True))
 
 
 def execute(args: Namespace) -> int:
-    """Merge sweeps into a new folder."""
     if len(args.folders) < 2:
         raise BadInput("merge: at least two folders are needed")
     paths = [store_path(folder) for folder in args.folders]

@@ -18,12 +18,10 @@ where it would be stored is refused with exit status 2, by `run` too; --yes acce
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(parser, "job", "--set", "--out", "--block", "--yes")
 
 
 def execute(args: Namespace) -> int:
-    """Print the plan."""
     sweep = load_job(args.job, args.overrides, args.block)
     folder = sweep_folder(args.out, sweep)
     need = estimate(sweep)

@@ -16,13 +16,11 @@ EPILOG = """examples:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     complete = "only if every point was tried; else exit status 75"
     add(parser, "folder", no_figures=flag("results.json only"), complete=flag(complete))
 
 
 def execute(args: Namespace) -> int:
-    """Reduce the sweep in a folder, finished or not."""
     folder = store_path(args.folder).parent
     if args.complete:
         left = int((read_ledger(folder / STORE)["status"] == Status.NEVER).sum())

@@ -36,7 +36,6 @@ _FAILURES = {code.name.lower(): code for code in Status if code.is_failure}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     failures = "only points that failed in these ways (default: all failed points)"
     add(
         parser,
@@ -48,7 +47,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Try the failed points of a sweep again."""
     statuses = statuses_of(args.status)
     for name in ("time_out", "max_steps"):
         value = getattr(args, name)

@@ -40,14 +40,12 @@ time or memory are tried run.attempts times in all; `retry` tries failed points 
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(parser, "job", "--set", "--out", *EXECUTOR)
     add_slurm(parser)
     add(parser, "--resubmit", "--block", "--no-figures", "--strict", "--yes")
 
 
 def execute(args: Namespace) -> int:
-    """Run the sweep of a job file."""
     with stop_request() as stop:
         try:
             start_early(args)

@@ -17,10 +17,9 @@ job file is
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments: none."""
+    pass
 
 
 def execute(args: Namespace) -> int:
-    """Print the schema."""
     print(schema_text(), end="")
     return Exit.COMPLETE

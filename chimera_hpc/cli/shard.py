@@ -34,7 +34,6 @@ _ELEMENT = "SLURM_ARRAY_TASK_ID"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     parser.add_argument("folder", **value("DIR", Path, "the sweep's folder, or a job file"))
     add(
         parser,
@@ -45,7 +44,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Compute one share."""
     share = share_of(args.index, args.of)
     with stop_request() as stop:
         try:
@@ -104,7 +102,6 @@ def _failed_points(store: Store, index: int, of: int) -> int:
 
 
 def _end(driver: Driver) -> int:
-    """Say how the share went, and return the exit status."""
     left = driver.pending()
     index, of = driver.executor.share or (0, 1)
     name = f"share {index} of {of}"

@@ -46,7 +46,6 @@ _FRAMES_A_PERIOD = 25
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(
         parser,
         *("folder", "point"),
@@ -59,7 +58,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Replay and draw."""
     path = store_path(args.folder)
     if not 0.0 < args.periods <= 1000.0:
         raise BadInput(f"--periods {args.periods}: a number above 0, up to 1000, is needed")
@@ -111,7 +109,6 @@ def _one_cell(store: Store, chosen: list[int]) -> None:
 
 
 def _tell(store: Store, run: Replay) -> None:
-    """Say what came out, and whether it is what is stored."""
     words = [f"{name_of(store, run.point)}: {run.class_name or 'not classified yet'}"]
     if np.isfinite(run.triplet).all():
         labels = ("V_theta", "V_a", "V_Omega")
@@ -197,7 +194,6 @@ def _three(triplet: Any) -> str:
 
 
 def _animate(store: Store, run: Replay, path: Path, periods: float) -> None:
-    """Write the last periods of a run as a film."""
     from chimera_hpc.plot.animation import animate_ring
     from chimera_hpc.reduction.replay import has_nullcline
 

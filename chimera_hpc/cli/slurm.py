@@ -60,7 +60,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Print or submit."""
     sweep = load_job(args.job, args.overrides, args.block)
     slurm_options = slurm_options_of(args, sweep)
     _check_times(args, slurm_options)

@@ -45,7 +45,6 @@ _PAUSE = 60.0
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(
         parser,
         *("folder", "--json"),
@@ -55,7 +54,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Print the state of the sweep."""
     path = store_path(args.folder)
     metadata = read_metadata(path)
     scan = scan_ledger(path, metadata)

@@ -35,7 +35,6 @@ _SAMPLE = 0.01
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(
         parser,
         "folder",
@@ -47,7 +46,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def execute(args: Namespace) -> int:
-    """Verify a store."""
     if args.sample is not None and not 0 <= args.sample <= 1:
         raise BadInput(f"--sample {args.sample}: a share from 0 to 1 is needed")
     if args.seed < 0:
@@ -95,7 +93,6 @@ def _forget(store: Store, damage: list[Damage]) -> None:
 
 
 def _verify_sample(store: Store, share: float, seed: int) -> bool:
-    """Compute some points again, and compare their digests with the ledger's."""
     ledger = store.ledger()
     results = np.flatnonzero((ledger["status"] >= 1) & (ledger["status"] <= 3))
     count = min(len(results), max(1, round(share * len(results)))) if share > 0 else 0

@@ -30,12 +30,10 @@ _OTHER_LINES = 14
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(parser, "folder", every=value("SECONDS", _seconds, "pause (default: 2)", default=2.0))
 
 
 def execute(args: Namespace) -> int:
-    """Show the state until the sweep is done."""
     from rich.console import Console
     from rich.live import Live
 
@@ -96,11 +94,9 @@ class _View:
 
     @property
     def exit_status(self) -> int:
-        """The exit status that `status` would have."""
         return Exit.FAILURES if self.state["failed"] else Exit.COMPLETE
 
     def look(self) -> RenderableType:
-        """Read the store and return what to show."""
         from rich.console import Group
         from rich.padding import Padding
         from rich.progress_bar import ProgressBar

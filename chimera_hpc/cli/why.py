@@ -23,12 +23,10 @@ _MOST = 10
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the command's arguments."""
     add(parser, "folder", "point")
 
 
 def execute(args: Namespace) -> int:
-    """Explain each point that is selected."""
     path = store_path(args.folder)
     from chimera_hpc.store.store import Store
 

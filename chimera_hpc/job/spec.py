@@ -140,7 +140,6 @@ class Sweep(Table):
 
     @property
     def n_nodes(self) -> int:
-        """Nodes of the ring, N0."""
         return int(self.fixed["n_nodes"])
 
     @cached_property

@@ -36,7 +36,6 @@ def _as_words(value: Any) -> Any:
 
 
 def _names(value: Any) -> Any:
-    """Return the naming rule or a tuple of different names."""
     names = _as_tuple(value)
     if names == "triplet":
         return names

@@ -67,7 +67,6 @@ class AnalysisInput:
 
     @property
     def n_cells(self) -> int:
-        """Number of cells."""
         return len(next(iter(self.cells.values())))
 
     def runs(self, cell: int) -> NDArray[np.int64]:
@@ -84,7 +83,6 @@ class AnalysisInput:
         return np.stack([self.scalar(f"local_sigma_{m + 1}") for m in range(groups)], axis=1)
 
     def need_runs(self) -> None:
-        """Raise BadInput unless two points have a result."""
         if self.has_result.sum() < 2:
             raise BadInput("too few runs yet")
 

@@ -199,7 +199,6 @@ def kept_audit(folder: Path, basis: Callable[[], Basis]) -> tuple[dict[str, Any]
 
 
 def _standing(folder: Path, results: Mapping[str, Any]) -> tuple[Basis, Runs]:
-    """Return the points with their classes as the store holds them."""
     store = Store.open(folder / STORE_NAME)
     ledger, scalars, stored = store.ledger(), store.scalars(), store.reduction()
     if results["points"] != count_points(ledger["status"]):
@@ -261,7 +260,6 @@ def _compared(
 
 
 def _ratio(steps: Integers, before: Integers) -> float:
-    """Return the steps of the runs over those of the stored ones."""
     return float(steps.sum() / max(1, before.sum()))
 
 

@@ -161,14 +161,12 @@ class _Work:
         )
 
     def _basis(self) -> Basis:
-        """What an audit of these classes stands on."""
         cuts = {k: (cut.labels, cut.names) for k, cut in self.classification.cuts.items()}
         judge = Labeller.of(self.store, Atlas.of(self.classification), self.atlases)
         runs = runs_of(self.status, self.scalars, self.ledger["steps"])
         return basis_of(self.store, self.ledger, runs, cuts, judge)
 
     def _analyses(self) -> dict[str, Any]:
-        """Make what ``reduction.analyses`` asks for."""
         store, spec = self.store, self.store.sweep.reduction
         if not spec.analyses and not spec.atlas:
             return {}
@@ -228,7 +226,6 @@ class _Work:
                 self.note(f"{asked} clusters: only {len(cut.names)}, of {members} oscillating runs")
 
     def draw(self) -> tuple[Path, ...]:
-        """Make the figures that the job asks for."""
         from chimera_hpc.plot.catalogue import choose
 
         asked = self.store.sweep.reduction.figures
@@ -280,7 +277,6 @@ class _Work:
         return {int(k): np.array(shares, dtype=np.float64) for k, shares in found.items()}
 
     def tell(self, figures: Sequence[Path]) -> None:
-        """Say what was found and where it is."""
         for line in self.table.splitlines():
             self._say(line)
         for line in self.results["warnings"]:

@@ -27,9 +27,7 @@ class NamedSweep(Protocol):
     """What is asked of a sweep."""
 
     @property
-    def name(self) -> str:
-        """Name of the sweep."""
-        ...
+    def name(self) -> str: ...
 
     def to_dict(self) -> dict[str, Any]:
         """Return the tables of the job file, defaults filled in."""

@@ -33,7 +33,6 @@ class Reporter:
         self._task: TaskID | None = None
 
     def __enter__(self) -> Self:
-        """Show the bar, on a terminal."""
         if self._stream.isatty():
             from rich.console import Console
             from rich.progress import (

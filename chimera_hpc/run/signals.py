@@ -22,7 +22,6 @@ class StopRequest:
         """Whether a signal raised KeyboardInterrupt; other packages may turn that into an error."""
 
     def __call__(self) -> bool:
-        """Return whether to stop."""
         return bool(self.asked)
 
     @property

@@ -35,7 +35,6 @@ class Damage:
     reason: str
 
     def __str__(self) -> str:
-        """Return what is damaged and how, on one line."""
         return f"block {self.block}, {self.array}: {self.reason}"
 
 
@@ -70,7 +69,6 @@ class BlockFiles:
         return cls(path, shapes, sweep.keep.dtype)
 
     def file(self, name: str, block: int) -> Path:
-        """Return the path of a chunk."""
         return self.path / name / chunk_name(block, len(self.shapes[name]))
 
     def empty(self, name: str) -> NDArray[Any]:

@@ -61,7 +61,6 @@ class Store:
     """
 
     def __init__(self, path: Path, metadata: Mapping[str, Any], sweep: Sweep) -> None:
-        """Take the store at `path` with this root metadata and the sweep they describe."""
         self.path = path
         self.metadata = metadata
         self.sweep = sweep
@@ -91,7 +90,6 @@ class Store:
 
     @property
     def n_blocks(self) -> int:
-        """Number of blocks."""
         return -(-self.n_points // self.block_size)
 
     def block(self, i: int) -> tuple[int, int]:

@@ -96,7 +96,6 @@ class Target:
         return [str(self.job), "--out", str(self.folder), *sets]
 
     def run(self, *words: str) -> str:
-        """Return the line that runs the job file."""
         return self.command("run", *self.words(), *words)
 
 

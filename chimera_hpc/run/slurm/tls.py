@@ -44,16 +44,13 @@ class Certificate:
 
     @property
     def key(self) -> Path:
-        """Its private key."""
         return self.folder / "key.pem"
 
     def worker_arguments(self) -> list[str]:
-        """Return what a Dask worker is started with."""
         cert, key = str(self.cert), str(self.key)
         return ["--tls-ca-file", cert, "--tls-cert", cert, "--tls-key", key]
 
     def security(self) -> Security:
-        """Return what Dask needs to know."""
         from distributed.security import Security
 
         cert, key = str(self.cert), str(self.key)

@@ -53,7 +53,6 @@ class Hours:
     _models: dict[object, tuple[float, CostModel]] = field(default_factory=dict)
 
     def over(self) -> bool:
-        """Return whether it is time to leave."""
         return time.time() >= self.leave_by
 
     def fits(self, store: Store, rows: Rows) -> bool:

@@ -87,7 +87,6 @@ class Keeper(threading.Thread):
             pause = min(2 * pause, _LONGEST_PAUSE) if waiting else _FIRST_PAUSE
 
     def close(self) -> None:
-        """Stop looking."""
         self._over.set()
 
     def coming(self) -> bool:
