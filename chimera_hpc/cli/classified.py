@@ -132,11 +132,7 @@ def _number(value: float) -> float | None:
 
 
 def draw(
-    args: Namespace,
-    made: Prepared,
-    found: Measured,
-    settings: Features,
-    judge: Judge | None,
+    args: Namespace, made: Prepared, found: Measured, settings: Features, judge: Judge | None
 ) -> list[Path]:
     """Draw the recording, its profiles, a spectrum, and its place in the atlas."""
     from chimera_hpc.plot.indicators import fourier_indicators, profiles_of

@@ -22,7 +22,7 @@ FILE_NAME = "job.schema.json"
 
 _USER_MODEL = {"type": "string", "pattern": ":", "description": "package.module:object"}
 _AT_LEAST_ONE = {  # keys of which a list may be written as one value
-    "reduction": ("atlas", "beside"),
+    "reduction": ("atlas", "beside")
 }
 
 

@@ -25,13 +25,7 @@ from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY, count_votes, modal_votes, vote_labels
-from chimera_hpc.classify.resampling import (
-    DRAWS,
-    FIRM,
-    compare_labels,
-    kept_shares,
-    spread_sample,
-)
+from chimera_hpc.classify.resampling import DRAWS, FIRM, compare_labels, kept_shares, spread_sample
 from chimera_hpc.reduction.audit_runs import WAYS, Runs, compute_again, described, runs_of
 from chimera_hpc.reduction.cells import free_axes
 from chimera_hpc.reduction.results import count_points, json_safe, read_results, to_json

@@ -33,12 +33,7 @@ from chimera_hpc.store.ledger import (
     unfinished,
 )
 from chimera_hpc.store.read import gather, read_series
-from chimera_hpc.store.reduction import (
-    StoredReduction,
-    Variable,
-    read_reduction,
-    write_reduction,
-)
+from chimera_hpc.store.reduction import StoredReduction, Variable, read_reduction, write_reduction
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import start_run
 from chimera_hpc.store.schema import BLOCK_ARRAYS, OPTIONAL, QUALITY, scalar_labels, series_mask
