@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 from jobs_for_tests import SMALL, job_text
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.store.claims import ClaimLost, claim_block
-from chimera_hpc.store.schema import encode_series, scalar_labels, series_mask
+from chimera_hpc.store.schema import MISSING, SCALE, scalar_labels, series_mask
 from chimera_hpc.store.store import Store
 
 JOB = job_text(
@@ -140,3 +140,16 @@ def claim_and_tell(path: Path, n_blocks: int, gate: Any, answers: Any) -> None:
     gate.wait()
     answers.put([block for block in range(n_blocks) if claim_block(path, block, os.getpid())])
     gate.wait()
+
+
+def encode_series(u: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
+    """Return a series as it is stored: float32, or int16 steps of `SCALE`.
+
+    Samples that are NaN or beyond +-3.2767 become `MISSING` in int16.
+    """
+    values = np.asarray(u)
+    if np.dtype(dtype) != np.int16:
+        return values.astype(dtype)
+    steps = np.rint(values / SCALE)
+    steps[~(np.abs(steps) <= -(MISSING + 1))] = MISSING
+    return steps.astype(np.int16)

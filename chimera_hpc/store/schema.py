@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
@@ -107,19 +107,6 @@ def series_mask(sweep: Sweep, seeds: NDArray[Any]) -> NDArray[np.bool_]:
         assert isinstance(axis, Values)
         return np.asarray(seeds == axis.values[0])
     return np.full(len(seeds), sweep.keep.series == "all")
-
-
-def encode_series(u: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
-    """Return a series as it is stored: float32, or int16 steps of `SCALE`.
-
-    Samples that are NaN or beyond +-3.2767 become `MISSING` in int16.
-    """
-    values = np.asarray(u)
-    if np.dtype(dtype) != np.int16:
-        return values.astype(dtype)
-    steps = np.rint(values / SCALE)
-    steps[~(np.abs(steps) <= -(MISSING + 1))] = MISSING
-    return steps.astype(np.int16)
 
 
 def decode_series(stored: NDArray[Any]) -> NDArray[np.float64]:

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from store_tools import encode_series
 
 from chimera_hpc.measures.series import by_node, quantise, round_to
-from chimera_hpc.store.schema import MISSING, SCALE, encode_series
+from chimera_hpc.store.schema import MISSING, SCALE
 
 
 def quantised(rows):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from store_tools import encode_series
 
 from chimera_hpc import fourier_features, simulate, total_variations
 from chimera_hpc.base.errors import BadInput
@@ -28,7 +29,6 @@ from chimera_hpc.store.block_result import failed_block
 from chimera_hpc.store.schema import (
     MISSING,
     decode_series,
-    encode_series,
     sample_times,
     scalar_labels,
 )

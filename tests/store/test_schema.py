@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from store_tools import small_sweep
+from store_tools import encode_series, small_sweep
 
 from chimera_hpc.job import Sweep
 from chimera_hpc.store.schema import (
     FEATURES,
     array_plans,
     decode_series,
-    encode_series,
     room,
     sample_times,
     scalar_labels,

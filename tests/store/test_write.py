@@ -152,7 +152,7 @@ def test_block_without_any_series_still_has_its_shard(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dtype", ["int16", "float32"])
 def test_values_beyond_the_range_are_missing_only_in_int16(tmp_path: Path, dtype: str) -> None:
-    from chimera_hpc.store.schema import encode_series
+    from store_tools import encode_series
 
     store = make_store(tmp_path, f"keep.dtype={dtype}")
     made = block_results(store, 0)
