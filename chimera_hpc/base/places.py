@@ -27,7 +27,7 @@ def private_folder() -> Path:
     Raises
     ------
     OSError
-        It cannot be made, or somebody else has made it.
+        It cannot be made, or another user has made it.
     """
     folder = Path(tempfile.gettempdir()) / f"chimera_hpc-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)

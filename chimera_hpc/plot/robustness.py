@@ -20,7 +20,7 @@ _SPARE = ("#aa3377", "#997700", "#0057b8", "#777777")
 
 
 def robustness_figure(data: FigureInput) -> Figure | None:
-    """Draw W(Q_r), with the sweeps beside this one (paper ratio-o1-o2)."""
+    """Draw W(Q_r), with the sweeps next to this one (paper ratio-o1-o2)."""
     curves = [*data.beside.values(), data.curves]
     bands = {}
     for entry in (each["robustness"] for each in curves if "robustness" in each):

@@ -60,5 +60,5 @@ def curves_beside(
         try:
             found[name] = read_results(sibling(folder, name) / "results.json")["curves"]
         except BadInput as error:
-            say(f"beside {name}: {error}")
+            say(f"reduction.beside: {name}: {error}")
     return found

@@ -37,7 +37,7 @@ for lanes in (1, LANES):
 
 
 def _say_nothing(text: str) -> None:
-    """Take a line for nobody."""
+    """Drop a line."""
 
 
 def compile_once(

@@ -218,7 +218,7 @@ def test_edit_of_a_module_beside_it_is_seen_in_the_record(apart: None, tmp_path:
         ({"more": "+ nothing_like_this"}, "does not compile: TypingError: "),
         ({"more": "+ nothing_like_this"}, "nothing_like_this"),
         ({"line": "z = np.zeros(3); dy[i, lane] += z[0]"}, "does not compile: "),
-        ({"lane": "0"}, "gives a run other numbers beside others than alone"),
+        ({"lane": "0"}, "gives a run other numbers next to others than alone"),
         ({"line": "y[i, lane] = 0.5"}, "changes the state y"),
         ({"line": "continue"}, "not finite in the initial state, or not set, in row 8"),
         ({"more": "+ np.log(-1.0)"}, "not finite in the initial state, or not set, in row 0"),
