@@ -40,12 +40,18 @@ def end(driver: Driver, folder: Path, args: Namespace) -> int:
     damage = _reduce(driver, folder, not args.no_figures)
     if driver.should_stop():
         return end(driver, folder, args)
+    # Someone may have extended the store since the run began.
+    store = store.open(store.path)
     for line in (*damage, *failures(store, folder)):
         print(line)
     for block, error in driver.broken.items():
         print(f"block {block} could not be done: {error.text} (more in {driver.log})")
-    failed = any(n for code, n in store.status().items() if code.is_failure)
-    return Exit.FAILURES if failed or damage or driver.broken else Exit.COMPLETE
+    if damage or driver.broken:
+        return Exit.FAILURES
+    counts = store.status()
+    if left := counts[Status.NEVER]:
+        print(f"{left} points were added meanwhile; to go on:\n  {again_command(args)}")
+    return Exit.of_points(left, sum(n for code, n in counts.items() if code.is_failure))
 
 
 def interrupted(stop: StopRequest, args: Namespace) -> int:

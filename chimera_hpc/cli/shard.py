@@ -11,6 +11,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
+from chimera_hpc.base.status import Status
 from chimera_hpc.cli.arguments import add, load_job, store_path, sweep_folder, value
 from chimera_hpc.cli.resubmitting import go_on
 from chimera_hpc.cli.run import open_or_plan
@@ -95,10 +96,11 @@ def _store_path(folder: Path, out: Path | None, overrides: list[str]) -> Path:
         return open_or_plan(place, sweep, yes=False).path
 
 
-def _failed_points(store: Store, index: int, of: int) -> int:
+def _points_left(store: Store, index: int, of: int) -> tuple[int, int]:
+    """Return how many points of a share are pending, and how many failed."""
     codes = store.ledger()["status"]
-    mine = np.arange(len(codes)) // store.block_size % of == index
-    return int(np.isin(codes[mine], FAILED).sum())
+    mine = codes[np.arange(len(codes)) // store.block_size % of == index]
+    return int((mine == Status.NEVER).sum()), int(np.isin(mine, FAILED).sum())
 
 
 def _end(driver: Driver) -> int:
@@ -110,6 +112,11 @@ def _end(driver: Driver) -> int:
         return Exit.MORE_TO_DO if driver.ended_by else driver.stop.exit_status
     for block, error in driver.broken.items():
         print(f"block {block} could not be done: {error.text} (more in {driver.log})")
-    failed = _failed_points(driver.store, index, of)
+    # Someone may have extended the store meanwhile.
+    pending, failed = _points_left(driver.store.open(driver.store.path), index, of)
     print(f"{name}: done" + (f", {failed} points failed" if failed else ""))
-    return Exit.FAILURES if failed or driver.broken else Exit.COMPLETE
+    if driver.broken:
+        return Exit.FAILURES
+    if pending:
+        print(f"{name}: {pending} points were added meanwhile; the same command computes them")
+    return Exit.of_points(pending, failed)

@@ -37,7 +37,7 @@ EPILOG = """examples:
 
 The map has one sign per cell, and colours on a terminal unless NO_COLOR is set: capital letters are
 classes (O ordered, C chimera, D disordered, S steady) once the sweep was reduced. `watch` shows
-the same again and again.
+the same again and again. The exit status is 75 as long as points are pending.
 """
 _RECENT_BLOCKS = 64
 _PAUSE = 60.0
@@ -66,7 +66,7 @@ def execute(args: Namespace) -> int:
             _print_map(path, metadata, scan)
     if args.failures and not args.json:
         _print_failures(path, args.folder)
-    return Exit.FAILURES if state["failed"] else Exit.COMPLETE
+    return Exit.of_points(state["pending"], state["failed"])
 
 
 def state_of(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> dict[str, Any]:

@@ -94,7 +94,7 @@ class _View:
 
     @property
     def exit_status(self) -> int:
-        return Exit.FAILURES if self.state["failed"] else Exit.COMPLETE
+        return Exit.of_points(self.state["pending"], self.state["failed"])
 
     def look(self) -> RenderableType:
         from rich.console import Group

@@ -1,4 +1,4 @@
-"""Exit status 1 wherever something is left that is not as it should be."""
+"""Exit status 1 wherever something is not as it should be, 75 where points are pending."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
+from chimera_hpc.base.exits import Exit
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.run import work
 from chimera_hpc.run.block import run_block
 from chimera_hpc.store.block_result import BlockResult
+from chimera_hpc.store.store import Store
 
 Run = Callable[..., tuple[int, str, str]]
 SERIAL = ("--cluster", "serial", "--no-figures")
@@ -72,3 +74,31 @@ def test_share_of_an_array_fails_when_a_block_was_put_aside(
     assert code == 1
     # The other share has nothing to do with that block.
     assert sweep(*words, 1)[0] == 0
+
+
+@pytest.mark.parametrize("command", ["run", "shard"])
+def test_points_that_were_added_during_a_run_are_pending(
+    command: str, job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    options = SERIAL if command == "run" else ("--of", "1", "--index", "0")
+    words = (command, job, "--out", out, *options)
+
+    def extending(*args: Any, **options: Any) -> BlockResult:
+        Store.open(out / "store.zarr").extend(Sweep.load(job, ["seeds=7"]))
+        return run_block(*args, **options)
+
+    monkeypatch.setattr(work, "run_block", extending)
+    code, said, _ = sweep(*words)
+    assert code == 75
+    assert "5 points were added meanwhile" in said
+    assert sweep("status", out)[0] == 75
+    monkeypatch.undo()
+    assert sweep(*words)[0] == 0
+    assert sweep("status", out)[0] == sweep("watch", out)[0] == 0
+
+
+def test_pending_points_outweigh_failed_ones() -> None:
+    assert Exit.of_points(1, 1) is Exit.of_points(1, 0) is Exit.MORE_TO_DO
+    assert Exit.of_points(0, 1) is Exit.FAILURES
+    assert Exit.of_points(0, 0) is Exit.COMPLETE
