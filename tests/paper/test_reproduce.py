@@ -7,8 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from scoreboard import audit
 from scoreboard.claims import read_claims
 from scoreboard.reproduce import main, write_scoreboard
+
+from chimera_hpc.base.errors import BadInput
 
 ROOT = Path(__file__).parents[2]
 
@@ -16,6 +19,41 @@ ROOT = Path(__file__).parents[2]
 def test_an_unknown_job_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--only", "diagonals", "--out", str(tmp_path)]) == 2
     assert "diagonals: not a job of the paper" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("only", "typed"),
+    [
+        ("typical", "--only diagonal,typical"),
+        ("still, robustness-2", "--only diagonal,orientation2,still,robustness-2"),
+    ],
+)
+def test_a_job_names_the_jobs_whose_classes_it_needs(
+    only: str, typed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--only", only, "--out", str(tmp_path / "new")]) == 2
+    said = capsys.readouterr().err
+    assert said.strip().endswith(typed)
+    assert said.count("\n") == 1
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_job_that_cannot_be_audited_is_said_and_the_others_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def audit_sweep(folder: Path, *args: object, **options: object) -> dict[str, object]:
+        if folder.name == "diagonal":
+            raise BadInput(f"{folder}: no point has a result yet; there is nothing to audit")
+        return {"points": 1, "ways": {}}
+
+    monkeypatch.setattr(audit, "audit_sweep", audit_sweep)
+    for name in ("diagonal", "still"):
+        (tmp_path / name / "store.zarr").mkdir(parents=True)
+    said: list[str] = []
+    found = audit.audit_jobs(tmp_path, ("diagonal", "still"), 0.1, 1, said.append)
+    assert list(found) == ["still"]
+    assert said[0].startswith("audit diagonal: ")
+    assert "nothing to audit" in said[0]
 
 
 def test_judging_an_empty_folder_writes_a_scoreboard(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.reduction.audit import Sample, audit_sweep
 from chimera_hpc.reduction.audit_runs import WAYS
 from chimera_hpc.store.labelled import STORE_NAME
@@ -30,8 +31,12 @@ def audit_jobs(
             continue
         sample = Sample(share, seed=_SEED + JOBS.index(name))
         ways = tuple(way for way in WAYS if way != "longer" or name not in _BASINS)
-        found[name] = audit_sweep(folder / name, sample, workers=workers, ways=ways)
-        say(f"audit {name}: {_line(found[name])}")
+        try:
+            found[name] = audit_sweep(folder / name, sample, workers=workers, ways=ways)
+        except BadInput as error:
+            say(f"audit {name}: {error}")
+        else:
+            say(f"audit {name}: {_line(found[name])}")
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.shipped import jobs_folder
 
 JOBS = (
     "diagonal",
@@ -53,6 +54,11 @@ QUICK: dict[str, tuple[str, ...]] = {
 def job_files(folder: str | Path) -> dict[str, Path]:
     """Return the job files by their names."""
     return {name: Path(folder) / f"{name}.toml" for name in JOBS}
+
+
+def needs(name: str) -> tuple[str, ...]:
+    """Return the jobs whose classes judge the runs of a job."""
+    return load(name, jobs_folder() / "paper").reduction.atlas
 
 
 def load(name: str, folder: str | Path, quick: bool = False) -> Sweep:

@@ -17,10 +17,11 @@ from typing import Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.job.shipped import jobs_folder
+from chimera_hpc.reduction.atlases import load_atlas
 from scoreboard.audit_text import audit_text
 from scoreboard.claims import markdown, read_claims, scoreboard, summary
 from scoreboard.evidence import Evidence
-from scoreboard.plan import JOBS, QUICK
+from scoreboard.plan import JOBS, QUICK, needs
 
 _ATLASES = ("diagonal", "orientation2")
 
@@ -46,13 +47,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     args = _parse(arguments)
     began = time.monotonic()
+    folder: Path = args.out.absolute()
     try:
         names = _chosen(args.only)
-    except BadInput as error:
+        _check_needs(names, folder)
+        folder.mkdir(parents=True, exist_ok=True)
+    except (BadInput, OSError) as error:
         print(error, file=sys.stderr)
         return 2
-    folder: Path = args.out.absolute()
-    folder.mkdir(parents=True, exist_ok=True)
     times = run_jobs(names, folder, args.quick, args.workers, print)
     failed = [name for name, (status, _) in times.items() if status]
     audit: dict[str, Any] = {}
@@ -105,11 +107,31 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 def _chosen(only: str | None) -> list[str]:
     if only is None:
         return list(JOBS)
-    names = [] if only == "none" else only.split(",")
+    names = [] if only == "none" else [name.strip() for name in only.split(",")]
     for name in names:
         if name not in JOBS:
             raise BadInput(f"--only {name}: not a job of the paper; known: {', '.join(JOBS)}")
     return [name for name in JOBS if name in names]
+
+
+def _check_needs(names: Sequence[str], folder: Path) -> None:
+    """Raise BadInput for a job whose judging classes are neither in `folder` nor to be made."""
+    for name in names:
+        needed = [other for other in needs(name) if other not in names]
+        missing = [other for other in needed if not _is_reduced(folder / other)]
+        if missing:
+            more = [other for other in JOBS if other in {*names, *needed}]
+            raise BadInput(
+                f"--only {name}: its runs are judged by the classes of {' and '.join(missing)}, "
+                f"which are not in {folder}; run them too: --only {','.join(more)}"
+            )
+
+
+def _is_reduced(folder: Path) -> bool:
+    try:
+        return bool(load_atlas(folder).names)
+    except BadInput:
+        return False
 
 
 def run_jobs(
