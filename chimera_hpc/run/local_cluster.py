@@ -79,7 +79,7 @@ def local_cluster(
     Scheduler and workers listen on the loopback interface only. They show no dashboards: loading
     Bokeh would take each of these processes a second, and `status` and `watch` read the store.
 
-    workers: number of worker processes; 0 means one a core.
+    workers: number of worker processes; 0 means one per core.
     patience: seconds after which a worker that gives no sign of life is replaced.
     scratch: folder for the workers' own files; a temporary one by default.
     memory_limit: memory at which a worker is ended and replaced; a share of the machine's by

@@ -165,8 +165,8 @@ def live_claims(store: Path) -> dict[int, Mapping[str, Any]]:
 def remove_stale(store: Path, blocks: Collection[int]) -> int:
     """Delete what is left of the claims on these finished blocks; return how many there were.
 
-    Their owners died after the ledger was written and before the release. Blocks in
-    claims.
+    Their owners died after the ledger was written and before the release. Blocks in work
+    keep their claims.
     """
     folder = Path(store) / FOLDER
     stale = [block for block, _, free in _highest(folder) if free and block in blocks]
