@@ -24,10 +24,7 @@ def home_folder() -> Path:
 def private_folder() -> Path:
     """Return a folder for temporary files that is the same for all processes of this user.
 
-    Raises
-    ------
-    OSError
-        It cannot be made, or another user has made it.
+    Raises OSError: it cannot be made, or another user has made it.
     """
     folder = Path(tempfile.gettempdir()) / f"chimera_hpc-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)

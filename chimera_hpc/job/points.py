@@ -63,10 +63,8 @@ class Points:
         Integers are compared exactly, all 64 bits of them. A float means the points that hold it
         exactly; without such a point, those of the one value within `ULPS` units in the last place.
 
-        Raises
-        ------
-        BadInput
-            For an unknown name, and for a float that is near to several values but equal to none.
+        Raises BadInput for an unknown name, and for a float that is near to several values but
+        equal to none.
         """
         if unknown := next((name for name in values if name not in self.columns), None):
             raise BadInput(f"{unknown}: no such parameter; known: {', '.join(self.columns)}")

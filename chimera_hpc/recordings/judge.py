@@ -248,8 +248,3 @@ def _typical(store: Store) -> tuple[float, float]:
     tables = [store.files.read("features", int(block)) for block in some]
     table = np.concatenate(tables)
     return float(np.nanmedian(table[:, 1])), float(np.nanmedian(table[:, 0]))
-
-
-def triplet_table(triplet: tuple[float, float, float]) -> dict[str, float]:
-    """Return the variations by their names."""
-    return dict(zip(TRIPLET, triplet, strict=True))
