@@ -21,7 +21,6 @@ from chimera_hpc.measures.windows import maxima
 from chimera_hpc.recordings.gaps import called
 from chimera_hpc.recordings.prepare import Prepared
 from chimera_hpc.reduction.atlases import load_atlas
-from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.store import Store
 
 Array = NDArray[np.float64]
