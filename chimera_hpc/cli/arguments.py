@@ -13,7 +13,6 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.renaming import warn
 from chimera_hpc.base.wording import short
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.job.shipped import job_file
@@ -144,7 +143,7 @@ def find_points(store: Store, words: Sequence[str]) -> list[int]:
     Raises BadInput for an unknown name, a value that is none, or when there is no such point.
     """
     text = " ".join(words)
-    table = parameters_of(store.sweep.model)
+    table = store.sweep.parameters
     values = parse_selection(text, "point", {p.name: p for p in (*table.parameters, DELTA, SEED)})
     found = store.points.find(**values).tolist()
     if not found:

@@ -19,6 +19,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.together import points_of
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
+from chimera_hpc.store.origin import stored_origin
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -57,12 +58,13 @@ class Cells:
 
     @classmethod
     def read(cls, store: Path, metadata: Mapping[str, Any]) -> Cells | None:
-        """Read the cells of a store; None when it has too many points, or a model is not there."""
+        """Read the cells of a store; None when it has too many points, or is damaged."""
         if int(metadata["attributes"]["n_points"]) > MOST_POINTS:
             return None
         specs = metadata["attributes"]["specs"]
         try:
-            points = points_of([Sweep.from_dict(spec, where=str(store)) for spec in specs])
+            origin = stored_origin(store, metadata)
+            points = points_of([Sweep.from_dict(spec, str(store), origin) for spec in specs])
         except BadInput:
             return None
         cell, columns = points.cells()

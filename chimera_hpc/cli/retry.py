@@ -95,5 +95,6 @@ def _store(path: Path, overrides: list[str]) -> Store:
     store = Store.open(path)
     if not overrides:
         return store
-    sweep = Sweep.from_dict(apply_overrides(store.sweep.to_dict(), overrides), where=str(path))
-    return store.adopt(sweep)
+    origin = store.sweep.origin
+    data = apply_overrides(store.sweep.to_dict(), overrides, origin)
+    return store.adopt(Sweep.from_dict(data, str(path), origin))

@@ -128,15 +128,15 @@ def _tell(store: Store, run: Replay) -> None:
 
 def _why(store: Store, point: int) -> list[str]:
     """Return what differs between now and the run that stored a point."""
-    from chimera_hpc.store.provenance import differences, gather, model_source
+    from chimera_hpc.store.provenance import differences, gather
     from chimera_hpc.store.runs import read_run
 
     try:
         before = read_run(store.path, int(store.ledger()["run"][point]))
     except BadInput as error:
         return [str(error)]
-    now = {**gather(), **model_source(store.sweep.model)}
-    return differences(before, now) or ["nothing known of differs; `verify` looks at the bytes"]
+    found = differences(before, gather(store.sweep))
+    return found or ["nothing known of differs; `verify` looks at the bytes"]
 
 
 def _stem(store: Store, point: int, with_seed: bool) -> str:

@@ -145,7 +145,7 @@ def _what_differs(store: Store, runs: NDArray[np.int64], wanted: bool) -> list[s
     from chimera_hpc.store.runs import read_run
 
     lines = []
-    now = gather(store.sweep.model)
+    now = gather(store.sweep)
     for run in np.unique(runs).tolist():
         try:
             found = differences(read_run(store.path, run), now)

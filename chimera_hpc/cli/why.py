@@ -81,7 +81,7 @@ def _provenance(store: Store, run: int) -> list[str]:
     names = read_work(store.path, run).get("machines")
     names = names if isinstance(names, list) else [f"{machine.get('host')}: {machine.get('cpu')}"]
     lines += [f"on {name}" for name in names]
-    return lines + [f"since then: {line}" for line in differences(info, gather(store.sweep.model))]
+    return lines + [f"since then: {line}" for line in differences(info, gather(store.sweep))]
 
 
 def _table(info: Mapping[str, Any], key: str) -> Mapping[str, Any]:

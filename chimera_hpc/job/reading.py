@@ -16,6 +16,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import short
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.tables import TABLES, unknown_key
+from chimera_hpc.job.user_models import Origin
 
 _BARE = re.compile(r"[^\[{\"'\n\r=#]+")
 _TOP = ("name", "title", "model")
@@ -46,20 +47,22 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         raise bad(where, f"not valid TOML: {error}") from None
 
 
-def apply_overrides(data: Mapping[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
+def apply_overrides(
+    data: Mapping[str, Any], overrides: Sequence[str], origin: Origin | None = None
+) -> dict[str, Any]:
     """Return the data with each KEY=VALUE applied.
 
     KEY is `table.key`, or a bare key: name, title, model; `seeds`; a parameter of the model; or a
     key of exactly one other table. A parameter is set in [grid] if it is an axis already or if the
     value is one (a list, a range, a name), else in [fixed]. VALUE is TOML, or bare text such as
-    3:8, P or sine-fit.
+    3:8, P or sine-fit. `origin` tells where a user's model comes from.
     """
     changed = {key: dict(v) if isinstance(v, dict) else v for key, v in data.items()}
     for override in overrides:
         key, equals, text = override.partition("=")
         if not equals or not key.strip():
             raise bad(f"--set {short(override)}", "KEY=VALUE is needed")
-        table, name = _place(changed, key.strip(), override)
+        table, name = _place(changed, key.strip(), override, origin)
         value = _parse_value(text.strip(), override)
         if not table:
             changed[name] = value
@@ -75,7 +78,9 @@ def _is_axis(value: Any) -> bool:
     return isinstance(value, str | list | dict)
 
 
-def _place(data: dict[str, Any], dotted: str, override: str) -> tuple[str, str]:
+def _place(
+    data: dict[str, Any], dotted: str, override: str, origin: Origin | None
+) -> tuple[str, str]:
     """Return the table (created if missing) and the key that an override sets."""
     table, _, key = dotted.rpartition(".")
     if not table and key in _TOP:
@@ -84,7 +89,7 @@ def _place(data: dict[str, Any], dotted: str, override: str) -> tuple[str, str]:
         if not isinstance(data.setdefault(name, {}), dict):
             raise bad(f"--set {short(override)}", f"{name} is not a table")
     if not table:
-        table = _table_of(data, key)
+        table = _table_of(data, key, origin)
     if table == "features" and key in renaming.FEATURES:
         new = renaming.FEATURES[key]
         renaming.warn(f"features.{key}", f"features.{new}")
@@ -95,14 +100,14 @@ def _place(data: dict[str, Any], dotted: str, override: str) -> tuple[str, str]:
     return table, key
 
 
-def _table_of(data: Mapping[str, Any], key: str) -> str:
+def _table_of(data: Mapping[str, Any], key: str, origin: Origin | None) -> str:
     """Return the table, other than [grid] and [fixed], that has this bare key, if any."""
     new = renaming.FEATURES.get(key, key)
     homes = [name for name, table in TABLES.items() if new in table.model_fields]
     if len(homes) != 1 or key in {*data["grid"], *data["fixed"], "delta"}:
         return ""
     try:
-        known = parameters_of(str(data.get("model", "")))
+        known = parameters_of(str(data.get("model", "")), origin)
     except BadInput:
         return ""
     return "" if known.find(key) else homes[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from hashlib import blake2b
@@ -13,6 +14,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import (
     Field,
+    PrivateAttr,
     StringConstraints,
     ValidationError,
     ValidationInfo,
@@ -35,7 +37,7 @@ from chimera_hpc.job.checks import (
     complete_fixed,
     parsed,
 )
-from chimera_hpc.job.models import look_in, parameters_of
+from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
 from chimera_hpc.job.points import DTYPES, Points, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
@@ -51,6 +53,8 @@ from chimera_hpc.job.tables import (
     Slurm,
     Table,
 )
+from chimera_hpc.job.user_models import Origin
+from chimera_hpc.models.parameters import ModelParameters
 
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
 _OLD_NAMES = {new: old for old, new in renaming.FEATURES.items()}
@@ -90,6 +94,7 @@ class Sweep(Table):
     keep: Keep = Field(default_factory=Keep)
     run: Run = Field(default_factory=Run)
     slurm: Slurm = Field(default_factory=Slurm)
+    _origin: Origin = PrivateAttr(default_factory=Origin)
 
     @classmethod
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Self:
@@ -113,12 +118,11 @@ class Sweep(Table):
         The module of a user's model is also searched for in `folder`.
         """
         data = parse_toml(text, where)
-        if folder is not None:
-            look_in(folder)
-        data = apply_overrides(_with_new_names(data, "features."), overrides)
+        origin = Origin(() if folder is None else (os.path.abspath(folder),))
+        data = apply_overrides(_with_new_names(data, "features."), overrides, origin)
         settings = "".join(f" --set {short(override)}" for override in overrides)
         where = f"{where} with{settings}" if settings else where
-        sweep = cls.from_dict(data, where=where)
+        sweep = cls.from_dict(data, where, origin)
         try:
             # A store may still name a method that was removed; a job may not.
             registry.method(sweep.integrator.method)
@@ -127,10 +131,13 @@ class Sweep(Table):
         return sweep
 
     @classmethod
-    def from_dict(cls, data: Any, where: str = "sweep") -> Self:
-        """Return the sweep of plain data as `to_dict` gives. Raises BadInput with one line."""
+    def from_dict(cls, data: Any, where: str = "sweep", origin: Origin | None = None) -> Self:
+        """Return the sweep of plain data as `to_dict` gives. Raises BadInput with one line.
+
+        `origin` tells where a user's model comes from.
+        """
         try:
-            return cls.model_validate(_with_new_names(data))
+            return cls.model_validate(_with_new_names(data), context=origin or Origin())
         except ValidationError as error:
             raise bad(where, one_line(error, list(cls.model_fields))) from None
 
@@ -139,13 +146,23 @@ class Sweep(Table):
         return self.model_dump(mode="json", exclude_none=True)
 
     @property
+    def origin(self) -> Origin:
+        """Where a user's model comes from."""
+        return self._origin
+
+    @property
+    def parameters(self) -> ModelParameters:
+        """The table of parameters of the model."""
+        return parameters_of(self.model, self._origin)
+
+    @property
     def n_nodes(self) -> int:
         return int(self.fixed["n_nodes"])
 
     @cached_property
     def axes(self) -> dict[str, Axis]:
         """Axes by the name of their column, in order of declaration, `seed` last."""
-        return axes_of(parameters_of(self.model), parsed(self.grid), self.fixed)
+        return axes_of(self.parameters, parsed(self.grid), self.fixed)
 
     @property
     def seeds(self) -> range | tuple[float, ...]:
@@ -185,7 +202,7 @@ class Sweep(Table):
         axes = self.axes
         columns = expand(axes)
         n_points = len(columns["seed"])
-        model = parameters_of(self.model)
+        model = self.parameters
         single = {**self.fixed, **model.constants, "delta": self.integrator.delta}
         kinds = {p.name: p.kind for p in (*model.parameters, DELTA, SEED)}
         kinds |= dict.fromkeys(model.constants, int)
@@ -201,25 +218,30 @@ class Sweep(Table):
 
     @field_validator("model")
     @classmethod
-    def _check_model(cls, model: str) -> str:
-        parameters_of(model)
+    def _check_model(cls, model: str, info: ValidationInfo) -> str:
+        parameters_of(model, info.context)
         return model
 
     @field_validator("grid")
     @classmethod
     def _normalise_grid(cls, grid: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        return Grid.of(parameters_of(info.data["model"]), grid) if "model" in info.data else grid
+        if "model" not in info.data:
+            return grid
+        return Grid.of(parameters_of(info.data["model"], info.context), grid)
 
     @field_validator("fixed", mode="before")
     @classmethod
     def _complete_fixed(cls, fixed: Any, info: ValidationInfo) -> Any:
         if not _is_table(fixed) or not {"model", "grid"} <= set(info.data):
             return fixed
-        return complete_fixed(parameters_of(info.data["model"]), fixed, info.data["grid"])
+        model = parameters_of(info.data["model"], info.context)
+        return complete_fixed(model, fixed, info.data["grid"])
 
     @model_validator(mode="after")
-    def _check_all(self) -> Self:
-        model, axes = parameters_of(self.model), self.axes
+    def _check_all(self, info: ValidationInfo) -> Self:
+        if ":" in self.model and info.context is not None:
+            self._origin = info.context
+        model, axes = self.parameters, self.axes
         check_points(model, axes, self.fixed)
         single = {name: Values((value,)) for name, value in self.fixed.items()}
         check_tables(self.integrator, self.features, model, {**single, **axes})

@@ -5,7 +5,6 @@ from __future__ import annotations
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.selection import parse_selection
 
 MOST_SAMPLES = 20_000
@@ -44,7 +43,7 @@ def single_point(sweep: Sweep, first: dict[str, int | float], text: str) -> Swee
     chosen = parse_selection(text, "reduction.replay")
     values = first | chosen
     data = sweep.to_dict()
-    names = [parameter.name for parameter in parameters_of(sweep.model).parameters]
+    names = [parameter.name for parameter in sweep.parameters.parameters]
     alien = {name: x for name, x in chosen.items() if name not in (*names, "seed", "delta")}
     t_end, t_step = sweep.integrator.t_end, sweep.integrator.t_step
     data |= {
@@ -53,4 +52,4 @@ def single_point(sweep: Sweep, first: dict[str, int | float], text: str) -> Swee
         "integrator": data["integrator"] | {"t_step": max(t_step, t_end / MOST_SAMPLES)},
         "features": data["features"] | {"start": 0.0},
     }
-    return Sweep.from_dict(data, where=f"reduction.replay: {text}")
+    return Sweep.from_dict(data, f"reduction.replay: {text}", sweep.origin)

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.integrate.jit import cache_folder, kernel_sources
-from chimera_hpc.store.provenance import PACKAGE, cpu_model
+from chimera_hpc.models.source import PACKAGE
+from chimera_hpc.store.provenance import cpu_model
 
 if TYPE_CHECKING:
     from chimera_hpc.job import Points, Sweep

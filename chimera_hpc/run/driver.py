@@ -133,7 +133,7 @@ class Driver:
         from chimera_hpc.run.messages import RunMessage
 
         store, say = self.store, self.reporter.say
-        info = gather(store.sweep.model)
+        info = gather(store.sweep)
         for line in changes(store, info, self.strict):
             say(line)
         run = store.start_run({**info, "cluster": self.executor.kind})

@@ -9,7 +9,6 @@ import re
 import socket
 import subprocess
 import sys
-import sysconfig
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
@@ -19,9 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc import __version__
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.places import user_name
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.user_models import user_model, user_source
+from chimera_hpc.models.source import PACKAGE
 
-PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "zarr", "dask", "distributed", "scikit-learn")
 _SLURM = (
     "SLURM_JOB_ID",
@@ -36,13 +38,13 @@ _SLURM = (
 _GIT_SECONDS = 5.0
 
 
-def gather(model: str = "") -> dict[str, Any]:
-    """Return what `runs/<number>.json` records of a run of this model: plain values for JSON.
+def gather(sweep: Sweep | None = None) -> dict[str, Any]:
+    """Return what `runs/<number>.json` records of a run of this sweep: plain values for JSON.
 
     Keys: package (name, version), source (digest of the package's own code), git (commit, dirty;
     None outside a checkout), python, libraries, machine (host, CPU, cores, system), user, process,
-    command, folder, started (UTC), slurm (those of its variables that are set); model (name and
-    digest of its source) where it is a user's own.
+    command, folder, started (UTC), slurm (those of its variables that are set), and what
+    `model_source` tells.
     """
     return {
         "package": {"name": PACKAGE.name, "version": __version__},
@@ -62,7 +64,7 @@ def gather(model: str = "") -> dict[str, Any]:
         "folder": os.getcwd(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "slurm": {name: os.environ[name] for name in _SLURM if name in os.environ},
-        **model_source(model),
+        **model_source(sweep),
     }
 
 
@@ -71,6 +73,10 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     lines = []
     for key in ("package", "source", "model", "python", "libraries"):
         lines += _lines(key, before.get(key), now.get(key))
+    for key in ("model_holds", "model_packages"):
+        # Version 0.1 recorded neither.
+        if key in before and key in now:
+            lines += _lines(key, before[key], now[key])
     machines = [run.get("machine") for run in (before, now)]
     cpus = [machine.get("cpu") if isinstance(machine, dict) else None for machine in machines]
     return lines + _lines("cpu", *cpus)
@@ -116,32 +122,26 @@ def cpu_model() -> str:
     return platform.processor() or platform.machine()
 
 
-def model_source(model: str) -> dict[str, str]:
-    """Return what to record of a user's model, `package.module:object`; nothing of another one.
+def model_source(sweep: Sweep | None) -> dict[str, Any]:
+    """Return what to record of a user's model; nothing of another one.
 
-    The digest is over the source files of its package, or over that of the module and of those
-    that were imported from the same folder.
+    Keys: model (its name, and a digest of the files of its code), model_holds (the files of data
+    that the code names, and the values that its functions hold, see `models.held`), model_packages
+    (the versions of what it imports). A model that cannot be imported has its name alone.
     """
-    module = sys.modules.get(model.partition(":")[0])
-    path = getattr(module, "__file__", None)
-    if ":" not in model or path is None:
+    if sweep is None or ":" not in sweep.model:
         return {}
-    total = blake2b(digest_size=8)
-    for file in _model_files(model.partition(":")[0], Path(path)):
-        total.update(f"{file.name}\0".encode() + file.read_bytes())
-    return {"model": f"{model}, source {total.hexdigest()}"}
-
-
-def _model_files(module: str, path: Path) -> list[Path]:
-    top = getattr(sys.modules[module.partition(".")[0]], "__path__", None)
-    if top is not None:
-        return sorted(file for folder in top for file in Path(folder).rglob("*.py"))
-    installed = set(sysconfig.get_paths().values())
-    if str(path.parent) in installed:
-        return [path]
-    loaded = (getattr(other, "__file__", None) for other in [*sys.modules.values()])
-    beside = {Path(file) for file in loaded if file and Path(file).parent == path.parent}
-    return sorted({path, *(file for file in beside if file.suffix == ".py")})
+    try:
+        own, source = user_model(sweep.model, sweep.origin), user_source(sweep.model, sweep.origin)
+    except BadInput:
+        return {"model": f"{sweep.model}, which cannot be imported"}
+    if source is None:
+        return {"model": sweep.model, "model_holds": own.held}
+    return {
+        "model": f"{sweep.model}, source {source.digest}",
+        "model_holds": {**source.data_digests(), **own.held},
+        "model_packages": source.versions(),
+    }
 
 
 def _lines(key: str, before: object, now: object) -> list[str]:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.axes import Values
-from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.registry import measures
 from chimera_hpc.store.ledger import FIELDS
@@ -225,7 +224,7 @@ def _time(times: NDArray[np.float64]) -> ArrayPlan:
 
 
 def _coordinate(sweep: Sweep, name: str, column: NDArray[Any]) -> ArrayPlan:
-    known = {"seed": SEED, "delta": DELTA}.get(name) or parameters_of(sweep.model).find(name)
+    known = {"seed": SEED, "delta": DELTA}.get(name) or sweep.parameters.find(name)
     attributes = {"units": "1", "long_name": known.text.rstrip(".") if known else name}
     integer = column.dtype.kind == "i"
     kind, fill = ("int64", 0) if integer else ("float64", math.nan)

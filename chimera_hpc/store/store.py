@@ -14,7 +14,9 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import remove_leftovers
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.models import model_folder
 from chimera_hpc.job.together import points_of
+from chimera_hpc.job.user_models import Origin
 from chimera_hpc.store.blocks import BlockFiles, Damage
 from chimera_hpc.store.check import find_damaged, shallow_damage
 from chimera_hpc.store.claims import FOLDER as CLAIMS
@@ -70,17 +72,20 @@ class Store:
         return cls.open(path)
 
     @classmethod
-    def open(cls, path: str | Path) -> Self:
-        """Open a store; BadInput when the path is not one or its attributes are beyond repair."""
+    def open(cls, path: str | Path, origin: Origin | None = None) -> Self:
+        """Open a store; BadInput when the path is not one or its attributes are beyond repair.
+
+        The module of a user's model is not imported unless `origin` says where it comes from.
+        """
         path = Path(path)
         metadata = read_metadata(path)
         try:
-            sweep = check_root(path, metadata)
+            sweep = check_root(path, metadata, origin)
         except BadInput:
             copy = read_copy(path)
             if copy is None:
                 raise
-            metadata, sweep = copy, check_root(path, copy)
+            metadata, sweep = copy, check_root(path, copy, origin)
         return cls(path, metadata, sweep)
 
     @property
@@ -97,7 +102,7 @@ class Store:
     def sweeps(self) -> tuple[Sweep, ...]:
         """The sweep as it was planned first, then each extension."""
         specs = self.metadata["attributes"]["specs"]
-        return tuple(Sweep.from_dict(spec, where=str(self.path)) for spec in specs)
+        return tuple(Sweep.from_dict(spec, str(self.path), self.sweep.origin) for spec in specs)
 
     @cached_property
     def points(self) -> Points:
@@ -122,16 +127,27 @@ class Store:
 
     def adopt(self, sweep: Sweep) -> Self:
         """Check the sweep, take over what may change between runs, and return the store."""
-        self.check_spec(sweep)
+        own = self._with_model_of(sweep)
+        own.check_spec(sweep)
         changes = {name: getattr(sweep, name) for name in _FREE_TABLES}
-        if self.sweep.model_copy(update=changes) == self.sweep:
-            return self
+        if own.sweep.model_copy(update=changes) == own.sweep and own._knows_the_folder():
+            return own
         with exclusive(self.path):
-            present = self.open(self.path)
+            present = self.open(self.path, own.sweep.origin)
             sweeps = (*present.sweeps[:-1], present.sweep.model_copy(update=changes))
             attributes = root_attributes(sweeps, present.n_points, self.block_size)
             consolidate(self.path, attributes)
-        return self.open(self.path)
+        return self.open(self.path, own.sweep.origin)
+
+    def _with_model_of(self, sweep: Sweep) -> Self:
+        """Return the store with a user's model as a job has it, from the job's folder first."""
+        if ":" not in sweep.model or sweep.model != self.sweep.model:
+            return self
+        return self.open(self.path, sweep.origin.before(self.sweep.origin))
+
+    def _knows_the_folder(self) -> bool:
+        known: str | None = self.metadata["attributes"].get("model_folder")
+        return model_folder(self.sweep) == known
 
     def extend(self, sweep: Sweep) -> Self:
         """Add the points of `sweep` that are not in the store, behind the others; return the store.
@@ -139,11 +155,12 @@ class Store:
         Finished points are not touched. `sweep` must hold all points of the store and differ in
         its axes only; else BadInput. Killed half-way, it has not happened and can be done again.
         """
+        origin = self._with_model_of(sweep).sweep.origin
         with exclusive(self.path):
-            present = self.open(self.path)
+            present = self.open(self.path, origin)
             repair_metadata(self.path, present.metadata, present.sweep, present.points)
             extend(self.path, present.sweeps, sweep, self.block_size)
-        return self.open(self.path)
+        return self.open(self.path, origin)
 
     # What is done, and what is to do
 

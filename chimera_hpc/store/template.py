@@ -25,8 +25,9 @@ from chimera_hpc.base.files import (
 )
 from chimera_hpc.base.streams import STREAM_TAG
 from chimera_hpc.job import Points, Sweep, block_size
-from chimera_hpc.job.models import look_in, model_folder
+from chimera_hpc.job.models import model_folder
 from chimera_hpc.job.spec import spec_digest
+from chimera_hpc.job.user_models import Origin
 from chimera_hpc.store.ledger import (
     METADATA,
     METADATA_COPY,
@@ -34,6 +35,7 @@ from chimera_hpc.store.ledger import (
     metadata_copy,
     read_metadata,
 )
+from chimera_hpc.store.origin import stored_origin
 from chimera_hpc.store.schema import (
     BLOCK_ARRAYS,
     OPTIONAL,
@@ -91,7 +93,7 @@ def build(path: Path, sweeps: Sequence[Sweep], points: Points, size: int) -> Non
 def root_attributes(sweeps: Sequence[Sweep], n_points: int, size: int) -> dict[str, Any]:
     """Return the attributes of the whole store; `sweeps` are the first plan and its extensions."""
     latest = sweeps[-1]
-    folder = model_folder(latest.model)
+    folder = model_folder(latest)
     return {
         "title": latest.title or latest.name,
         "schema": SCHEMA,
@@ -126,17 +128,19 @@ def consolidate(path: Path, attributes: Mapping[str, Any] | None = None) -> None
     _write_root(path, root["attributes"] if attributes is None else attributes, nodes)
 
 
-def check_root(path: Path, root: Mapping[str, Any]) -> Sweep:
-    """Return the sweep that root metadata describe; BadInput when they contradict themselves."""
+def check_root(path: Path, root: Mapping[str, Any], origin: Origin | None = None) -> Sweep:
+    """Return the sweep that root metadata describe; BadInput when they contradict themselves.
+
+    `origin` tells where a user's model comes from; without it `stored_origin` does.
+    """
     attributes, nodes = root["attributes"], root["consolidated_metadata"]["metadata"]
-    if "model_folder" in attributes:
-        look_in(attributes["model_folder"])
-    sweep = Sweep.from_dict(attributes["spec"], where=str(path))
+    origin = origin or stored_origin(path, root)
+    sweep = Sweep.from_dict(attributes["spec"], str(path), origin)
     specs = attributes.get("specs")
     if _digest(attributes) != attributes["digest"] or not isinstance(specs, list) or not specs:
         raise BadInput(f"{path}: the attributes spec, specs and digest do not belong together")
     for spec in specs:
-        Sweep.from_dict(spec, where=str(path))
+        Sweep.from_dict(spec, str(path), origin)
     n_points = attributes["n_points"]
     damaged = [name for name, node in nodes.items() if not _is_sound(name, node, n_points)]
     for plan in block_plans(sweep, n_points, attributes["block_size"]):

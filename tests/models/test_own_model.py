@@ -198,16 +198,17 @@ def test_results_follow_an_edit_of_the_model(apart: None, tmp_path: Path) -> Non
 
 def test_edit_of_a_module_beside_it_is_seen_in_the_record(apart: None, tmp_path: Path) -> None:
     from chimera_hpc.job import Sweep
+    from chimera_hpc.job.shipped import job_file
     from chimera_hpc.store.provenance import model_source
 
     (tmp_path / "mine_helper.py").write_text("FACTOR = 1.0\n")
     job = write(tmp_path, "mine_source", before="import mine_helper")
-    model = Sweep.load(job).model
+    model = Sweep.load(job)
     before = model_source(model)
     assert before == model_source(model)
     (tmp_path / "mine_helper.py").write_text("FACTOR = 2.0\n")
     assert model_source(model) != before
-    assert model_source("topological_fhn") == {}
+    assert model_source(Sweep.load(job_file("quickstart"))) == {}
 
 
 @pytest.mark.parametrize(
