@@ -5,7 +5,9 @@ milliseconds: the kernels compile, and scikit-learn alone takes seconds.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+
+# Not from typing: the current folder, which may hold a typing.py, may come first on the path yet.
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from chimera_hpc.measures.fourier import fourier_features

@@ -7,6 +7,7 @@ from argparse import ArgumentParser, Namespace
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.cli.arguments import add, load_job, sweep_folder
 from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, refuse_absurd
+from chimera_hpc.cli.run import check_drawing
 
 EPILOG = """examples:
   python -m chimera_hpc.sweep plan jobs/quickstart.toml
@@ -23,6 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def execute(args: Namespace) -> int:
     sweep = load_job(args.job, args.overrides, args.block)
+    check_drawing(sweep)
     folder = sweep_folder(args.out, sweep)
     need = estimate(sweep)
     print(f"sweep       {sweep.name} ({sweep.model}), digest {sweep.digest}")

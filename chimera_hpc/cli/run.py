@@ -69,6 +69,14 @@ def execute(args: Namespace) -> int:
             return interrupted(stop, args)
 
 
+def check_drawing(sweep: Sweep) -> None:
+    """Raise BadInput if a user's model is another one in another process."""
+    if ":" in sweep.model:
+        from chimera_hpc.run.second_draw import check_in_second_process
+
+        check_in_second_process(sweep)
+
+
 def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
     """Return the store in ``folder`` for this sweep: a new one, or the one to go on with."""
     path = folder / STORE
@@ -78,6 +86,7 @@ def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
         exists = path.exists()
         if not exists:
             refuse_absurd(sweep, estimate(sweep), folder, yes)
+            check_drawing(sweep)
         from chimera_hpc.store.store import Store
 
         if exists:

@@ -91,7 +91,7 @@ class Sweep(Table):
     features: Features = Field(default_factory=Features)
     measures: Measures = Field(default_factory=Measures)
     reduction: Reduction = Field(default_factory=Reduction)
-    keep: Keep = Field(default_factory=Keep)
+    keep: Keep = Field(default_factory=Keep, validate_default=True)
     run: Run = Field(default_factory=Run)
     slurm: Slurm = Field(default_factory=Slurm)
     _origin: Origin = PrivateAttr(default_factory=Origin)
@@ -236,6 +236,12 @@ class Sweep(Table):
             return fixed
         model = parameters_of(info.data["model"], info.context)
         return complete_fixed(model, fixed, info.data["grid"])
+
+    @field_validator("keep")
+    @classmethod
+    def _own_dtype(cls, keep: Keep, info: ValidationInfo) -> Keep:
+        # Nothing is known of the size of a user's signals.
+        return keep.with_dtype("float32") if ":" in info.data.get("model", "") else keep
 
     @model_validator(mode="after")
     def _check_all(self, info: ValidationInfo) -> Self:

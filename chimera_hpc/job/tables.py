@@ -235,8 +235,21 @@ class Keep(Table):
         "all", description="Points whose u is kept."
     )
     dtype: Literal["int16", "float32"] = Field(
-        "int16", description="Type of the kept u; int16 counts steps of 1e-4."
+        "int16",
+        description="Type of the kept u; int16 counts steps of 1e-4, up to 3.2767. "
+        "A user's model has float32 by default.",
     )
+
+    def with_dtype(self, dtype: Literal["int16", "float32"]) -> Keep:
+        """Return the same with another default of `dtype`, which a job may override."""
+        if "dtype" in self.model_fields_set:
+            return self
+        values = {**dict(self), "dtype": dtype}
+        return Keep.model_construct(_fields_set={*self.model_fields_set}, **values)
+
+    def fits(self, stored: Keep) -> bool:
+        """Return whether a store has what a job asks for, as far as the job does."""
+        return self.with_dtype(stored.dtype) == stored
 
 
 class Run(Table):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.foreign import foreign_code
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.lanes import Control, Outcome, Stopped, integrate
@@ -88,11 +89,30 @@ def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
     stored (T, N): in the type of the store.
     """
     if stored.dtype != np.int16:
-        stored[:] = u.T
+        with np.errstate(over="ignore"):  # what does not fit is found by `_misfit`
+            stored[:] = u.T
         back[:] = stored.T
     elif quantise(u, SCALE, MISSING, stored, back):
         round_to(by_node(u, back), SCALE, back)
     return back
+
+
+class DoesNotFit(BadInput):
+    """A series that the store's type cannot hold: another job is needed, not another try."""
+
+
+def _misfit(u: Array, stored: NDArray[Any]) -> str | None:
+    """Return why a store's type cannot hold a signal, of which `stored` is what it holds."""
+    lost = stored == MISSING if stored.dtype == np.int16 else ~np.isfinite(stored)
+    if not lost.any():
+        return None
+    most = float(np.abs(u).max())
+    if not np.isfinite(most):
+        return "the observed signal u is not finite"
+    limit = -(MISSING + 1) * SCALE if stored.dtype == np.int16 else np.finfo(np.float32).max
+    other = 'set keep.dtype = "float32", with a new --out' if stored.dtype == np.int16 else ""
+    text = f"u reaches {most:.5g}, and {stored.dtype} holds it up to {limit:.5g} only"
+    return f"{text}: {other or 'observe a smaller signal'}"
 
 
 class _Block:
@@ -103,7 +123,8 @@ class _Block:
     ) -> None:
         n, times = len(points), sample_times(sweep)
         self.sweep, self.times, self.on_signals = sweep, times, on_signals
-        rows = [points.row(i) for i in range(n)]
+        rows = self.rows = [points.row(i) for i in range(n)]
+        self.axes = points.axes
         self.models, self.initial = [], []
         for row in rows:
             with foreign_code():
@@ -176,7 +197,9 @@ class _Block:
         stored = self.stored
         if result.series is not None and self.keeps[row]:
             stored = result.series[row]
-        u = store_as(u, stored, self.u)
+        signal, u = u, store_as(u, stored, self.u)
+        if stored is not self.stored and (reason := _misfit(signal, stored)):
+            raise DoesNotFit(f"{self.place(row)}: {reason}")
         w = by_node(w, self.w)
         features = self.features(u)
         result.status[row] = features.status
@@ -184,6 +207,10 @@ class _Block:
         result.features[row] = features.as_array()
         result.quality[row] = quality(features, self.sweep.integrator.t_step)
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
+
+    def place(self, row: int) -> str:
+        """Return the point in words: ``P=3 seed=7``."""
+        return " ".join(f"{name}={self.rows[row][name]}" for name in self.axes)
 
     def features(self, u: Array) -> FourierFeatures:
         return fourier_features(self.times, u.T, **self.options)

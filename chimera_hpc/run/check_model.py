@@ -33,8 +33,13 @@ def check_user_model(sweep: Sweep, row: Row) -> None:
     try:
         with foreign_code():
             model = build(sweep, row)
-            _check_shapes(sweep, row, model)
-            state = model.state(*initial_state(sweep, row, model))
+            state = _check_shapes(sweep, row, model)
+            again = model.state(*initial_state(sweep, row, model))
+        if state.tobytes() != again.tobytes():
+            raise BadInput(
+                "initial draws another state when it is called again: every random number must "
+                "come from its argument rng"
+            )
         rhs = model.right_hand_side
         with foreign_code():
             _check_right_hand_side(model, rhs, state)
@@ -46,7 +51,7 @@ def check_user_model(sweep: Sweep, row: Row) -> None:
         raise BadInput(f"{where} does not work: {text}") from None
 
 
-def _check_shapes(sweep: Sweep, row: Row, model: Model) -> None:
+def _check_shapes(sweep: Sweep, row: Row, model: Model) -> Array:
     u, v = initial_state(sweep, row, model)
     state = np.asarray(model.state(u, v))
     _expect("state(u, v)", state.shape, (model.n_rows,))
@@ -58,6 +63,7 @@ def _check_shapes(sweep: Sweep, row: Row, model: Model) -> None:
         _expect(f"node_pair(rows)[{i}]", signal.shape, (model.n_nodes, 1))
     second = model.second_variable(state[:, None], v, np.zeros(1))
     _expect("second_variable(rows, v0, t)", second.shape, (1, model.n_second))
+    return state
 
 
 def _check_right_hand_side(model: Model, rhs: Any, state: Array) -> None:

@@ -75,7 +75,7 @@ def _compile_in_two_processes(sweep: Sweep, points: Points) -> None:
     from chimera_hpc.run.block import warm_up_features
 
     none = subprocess.DEVNULL
-    command = [sys.executable, "-c", _STEPPING_LOOPS]
+    command = [sys.executable, "-P", "-c", _STEPPING_LOOPS]
     try:
         second = subprocess.Popen(command, stdin=none, stdout=none, stderr=none)
     except OSError:

@@ -65,6 +65,7 @@ class Driver:
         self._errors: Counter[int] = Counter()
         self._machines: list[str] = []
         self._late = False
+        self._refused: str | None = None
         self.report: Refreshing | None = None
         """Written again from time to time while the work goes on, if given."""
         self.meanwhile: Callable[[], object] | None = None
@@ -73,13 +74,18 @@ class Driver:
         """The command line of this process, if it runs nothing else."""
 
     def work(self) -> None:
-        """Do what is left of the store until nothing is left, or to stop."""
+        """Do what is left of the store until nothing is left, or to stop.
+
+        Raises BadInput for what only another job, or another model, can put right.
+        """
         try:
             reporter = Reporter(self.store.n_points, self.log)
         except OSError as error:
             raise _cannot_write(self.log, error) from None
         with reporter as self.reporter, self.stop.good_order():
             self._work()
+        if self._refused is not None:
+            raise BadInput(self._refused)
 
     def should_stop(self) -> bool:
         """Return whether a signal asked to stop, or going on has become hopeless."""
@@ -285,7 +291,9 @@ class Driver:
     def _note_error(self, block: int, error: BlockError) -> None:
         self.reporter.note(f"block {block}: {error.trace}")
         self._errors[block] += 1
-        if error.errno in HOPELESS:
+        if error.bad_input:
+            self._refused = self._refused or error.text
+        if error.errno in HOPELESS or error.bad_input:
             self.ended_by = self.ended_by or error.text
         elif error.errno is None or self._errors[block] >= _BLOCK_TRIES:
             self.broken[block] = error

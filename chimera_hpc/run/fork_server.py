@@ -28,6 +28,8 @@ BLOCKED = frozenset({signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR
 and stops the workers; the fork server never does, a worker from `SignalPlugin.setup` on."""
 _HASH_SEED = {"PYTHONHASHSEED": "6640"}
 """The seed that Dask gives each worker process."""
+_SAFE_PATH = {"PYTHONSAFEPATH": "1"}
+"""No module of the current folder stands in for a library."""
 
 
 def start_fork_server() -> str:
@@ -37,7 +39,7 @@ def start_fork_server() -> str:
     not warn about the semaphores of killed workers, which it removes.
     """
     quiet = [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"]
-    with _environment({"PYTHONWARNINGS": ",".join(filter(None, quiet))}):
+    with _environment({"PYTHONWARNINGS": ",".join(filter(None, quiet))} | _SAFE_PATH):
         resource_tracker.ensure_running()
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return "spawn"
@@ -45,7 +47,7 @@ def start_fork_server() -> str:
 
     threads = {name: os.environ.get(name, value) for name, value in ONE_THREAD.items()}
     multiprocessing.set_forkserver_preload(["chimera_hpc.run.preload"])
-    with _environment(threads | _HASH_SEED), signals_blocked():
+    with _environment(threads | _HASH_SEED | _SAFE_PATH), signals_blocked():
         forkserver.ensure_running()
     return "forkserver"
 

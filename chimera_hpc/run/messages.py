@@ -71,6 +71,8 @@ class BlockError:
     """The traceback, for the log."""
     errno: int | None = None
     """Of an error of the operating system, such as a full disk."""
+    bad_input: bool = False
+    """Only another job can put it right: the run ends."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from chimera_hpc.base.files import HOPELESS
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points
-from chimera_hpc.run.block import run_block
+from chimera_hpc.run.block import DoesNotFit, run_block
 from chimera_hpc.run.messages import BlockError, BlockReceipt, RunMessage, tell_to_stop
 from chimera_hpc.run.slurm import walltime
 from chimera_hpc.run.watchdog import limit_of
@@ -79,6 +79,9 @@ def do_block(
         if failure.errno in HOPELESS:
             # Before a worker computes the next block in its queue for nothing.
             tell_to_stop(message)
+    except DoesNotFit as failure:
+        error = BlockError(str(failure), traceback.format_exc(), bad_input=True)
+        tell_to_stop(message)
     except Exception as failure:
         error = _block_error(_in_a_line(failure))
     return BlockReceipt(block, error=error, machine=_machine())
@@ -206,7 +209,7 @@ class _Block:
             if len(rows) > 1:
                 return None
             return failed_block(self.sweep, points, Status.OUT_OF_MEMORY)
-        except OSError:
+        except (OSError, DoesNotFit):
             raise
         except Exception as error:
             # An error in the code of a model: the other points of the block must not suffer.

@@ -121,7 +121,7 @@ class Store:
         if sweep.digest not in {known.digest for known in self.sweeps}:
             lines = "; ".join(sweep.explain_difference(self.sweep))
             raise BadInput(f"{self.path}: holds another sweep: {lines}")
-        if sweep.keep != self.sweep.keep:
+        if not sweep.keep.fits(self.sweep.keep):
             kept = f"series={self.sweep.keep.series}, dtype={self.sweep.keep.dtype}"
             raise BadInput(f"{self.path}: keep may not change within one store, it has {kept}")
 
@@ -159,6 +159,8 @@ class Store:
         with exclusive(self.path):
             present = self.open(self.path, origin)
             repair_metadata(self.path, present.metadata, present.sweep, present.points)
+            if sweep.keep.fits(present.sweep.keep):
+                sweep = sweep.model_copy(update={"keep": present.sweep.keep})
             extend(self.path, present.sweeps, sweep, self.block_size)
         return self.open(self.path, origin)
 

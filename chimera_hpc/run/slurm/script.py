@@ -41,14 +41,15 @@ def job_name(store: Path, what: str = "") -> str:
 def environment_lines() -> list[str]:
     """Return the shell lines that every job begins with.
 
-    One thread per process; compiled kernels in the user's cache folder, apart for each node, where
-    no one else can write; scratch where the site wants it.
+    No module of the current folder in place of a library; one thread per process; compiled kernels in
+    the user's cache folder, apart for each node, where no one else can write; scratch where the
+    site wants it.
     """
     threads = " ".join(f"{name}={value}" for name, value in ONE_THREAD.items())
     node = "${SLURMD_NODENAME:-$(hostname -s)}"
     kernels = "${XDG_CACHE_HOME:-$HOME/.cache}/chimera_hpc/numba-" + node
     return [
-        f"export {threads}",
+        f"export PYTHONSAFEPATH=1 {threads}",
         f'export NUMBA_CACHE_DIR="${{NUMBA_CACHE_DIR:-{kernels}}}"',
         'export DASK_TEMPORARY_DIRECTORY="${TMPDIR:-/tmp}"',
     ]

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from chimera_hpc.base.current_folder import leave_current_folder
+
+if __name__ == "__main__":
+    leave_current_folder()
+
 import sys
 from pathlib import Path
 
