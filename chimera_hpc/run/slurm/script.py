@@ -41,8 +41,8 @@ def job_name(store: Path, what: str = "") -> str:
 def environment_lines() -> list[str]:
     """Return the shell lines that every job begins with.
 
-    No module of the current folder in place of a library; one thread per process; compiled kernels in
-    the user's cache folder, apart for each node, where no one else can write; scratch where the
+    No module of the current folder in place of a library. One thread per process. Compiled kernels
+    in the user's cache folder, apart for each node, where no one else can write. Scratch where the
     site wants it.
     """
     threads = " ".join(f"{name}={value}" for name, value in ONE_THREAD.items())
