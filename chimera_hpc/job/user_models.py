@@ -26,6 +26,8 @@ from chimera_hpc.models.parameters import ModelParameters
 from chimera_hpc.models.source import SourceFiles, module_file, source_files
 
 _MODULE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
+_appended: list[str] = []
+"""The folder of the last model that was imported, where it stands on the Python path for that."""
 _WHERE = "it must be in the job's folder, the current one, or on PYTHONPATH"
 
 
@@ -121,7 +123,8 @@ def _find(where: str, module: str, first: tuple[str, ...]) -> SourceFiles | None
 
     Raises BadInput if another folder has a module of the name with other contents.
     """
-    files = (module_file(folder, module) for folder in dict.fromkeys((*first, *sys.path)) if folder)
+    path = [folder for folder in sys.path if folder and folder not in _appended]
+    files = (module_file(folder, module) for folder in dict.fromkeys((*first, *path)))
     places: dict[Path, Path] = {}
     for file in filter(None, files):
         places.setdefault(file.resolve(), file.absolute())
@@ -172,8 +175,13 @@ def _import_top(top: str, found: SourceFiles) -> None:
     Modules next to it are found at the end of the Python path, behind all libraries.
     """
     folder = str(found.folder)
+    for other in _appended:
+        with suppress(ValueError):
+            sys.path.remove(other)
+    _appended.clear()
     if folder not in sys.path:
         sys.path.append(folder)
+        _appended.append(folder)
     if top in sys.modules:
         present = _file_of(top)
         if present is not None and present.is_relative_to(found.folder):
