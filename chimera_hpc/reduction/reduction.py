@@ -19,6 +19,7 @@ from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.modes import run_names
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
+from chimera_hpc.reduction.caveat import caveats
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import reduction_variables
@@ -141,7 +142,7 @@ class _Work:
         self.results = build_results(
             store.sweep, store.points, self.ledger, made, self.curves, claims, self.quality
         )
-        self.results["warnings"] = quality_warnings(
+        self.results["warnings"] = caveats(store.sweep) + quality_warnings(
             store.sweep, self.status, self.scalars, self.quality, made.cuts
         )
         self.curves = self.results["curves"]
