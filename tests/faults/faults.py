@@ -213,6 +213,48 @@ def _misbehave(
     return trial.finding(deaths * BLOCK, broken=(BROKEN,))
 
 
+# Another model than that of the results
+
+
+@fault("a changed weight file")
+def weight_changed(trial: Trial) -> Finding:
+    file = trial.folder / "weight.txt"
+    file.write_text("1.0")
+    _stop_half_way(trial, TROUBLE_WEIGHT=str(file))
+    file.write_text("1.5")
+    _expect_refusal(trial, "trouble.WEIGHT: 1.0 before, 1.5 now", TROUBLE_WEIGHT=str(file))
+    file.write_text("1.0")
+    trial.resume(TROUBLE_WEIGHT=str(file))
+    return trial.finding(2 * BLOCK)
+
+
+@fault("two candidate modules")
+def two_modules(trial: Trial) -> Finding:
+    _stop_half_way(trial)
+    other = trial.folder / "trouble.py"
+    other.write_text((Path(__file__).parent / "trouble.py").read_text() + "# edited\n")
+    _expect_refusal(trial, "two different files may be meant")
+    other.unlink()
+    trial.resume()
+    return trial.finding(2 * BLOCK)
+
+
+def _stop_half_way(trial: Trial, **environment: str) -> None:
+    child = trial.start_run(*trial.places, **environment)
+    trial.wait_for_a_moment(child)
+    child.signal(signal.SIGTERM)
+    trial.ended(child, (75, 0))
+
+
+def _expect_refusal(trial: Trial, words: str, **environment: str) -> None:
+    """Go on with --strict: one line, unless nothing was left to do and the model is the same."""
+    left = trial.blocks_done() < N_BLOCKS or not environment
+    text = trial.resume("--strict", expect=2 if left else 0, **environment)
+    errors = [line for line in text.splitlines() if line.startswith("error: ")]
+    if left and not (len(errors) == 1 and words in errors[0]):
+        trial.problems.append(f"not refused in one line: {text[-400:]}")
+
+
 # Disks
 
 

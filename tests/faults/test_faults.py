@@ -38,7 +38,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
 
 
 def test_there_are_faults_of_every_kind() -> None:
-    assert len(fault_names()) == len(set(fault_names())) == 26
+    assert len(fault_names()) == len(set(fault_names())) == 28
 
 
 @pytest.mark.parametrize("name", fault_names())

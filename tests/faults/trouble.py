@@ -9,6 +9,7 @@ TROUBLE          ``kind:P:seed``: this point misbehaves. Kinds: ``kill`` (the pr
                  bounds), ``raise`` (an error in the model's code)
 TROUBLE_SECONDS  time that each point takes before anything else
 TROUBLE_LOG      file that gets a line ``P seed`` for each point that is begun
+TROUBLE_WEIGHT   file with a number, read at import, by which epsilon is multiplied
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import os
 import signal
 import time
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -25,6 +27,8 @@ from chimera_hpc.models.parameters import ModelParameters, Parameter
 from chimera_hpc.models.topological_fhn import TopologicalFHN
 from chimera_hpc.network.topology import Topology
 
+_FILE = os.environ.get("TROUBLE_WEIGHT")
+WEIGHT = float(Path(_FILE).read_text()) if _FILE else 1.0
 _STEP = 16_000_000
 _ENOUGH = 1_500_000_000
 
@@ -44,7 +48,9 @@ class Trouble:
         kind, _, which = os.environ.get("TROUBLE", "").partition(":")
         changes = _misbehave(kind) if which == f"{half_degree}:{seed}" else {}
         topology = Topology.ring(sweep.n_nodes, half_degree, 1).reorient_node(0, half_degree)
-        return TopologicalFHN(topology, **{"epsilon": 0.05, "b": 0.5, "c": -0.01, **changes})
+        return TopologicalFHN(
+            topology, **{"epsilon": 0.05 * WEIGHT, "b": 0.5, "c": -0.01, **changes}
+        )
 
 
 MODEL = Trouble()

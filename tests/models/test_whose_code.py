@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.job import Sweep
+from chimera_hpc.job import Sweep, user_models
 from chimera_hpc.job.models import build
 from chimera_hpc.models.held import held_values
 from chimera_hpc.run.second_draw import drawn
@@ -89,14 +89,20 @@ def apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.chdir(tmp_path)
     yield
-    for name in [name for name in sys.modules if name.startswith("mine_")]:
-        del sys.modules[name]
+    edited()
 
 
 def run(cwd: Path, *words: object) -> subprocess.CompletedProcess[str]:
     """Run a command line in a process and a folder of its own."""
     command = [sys.executable, "-m", "chimera_hpc.sweep", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=dict(os.environ))
+
+
+def edited() -> None:
+    """Forget the model, as a new process would."""
+    user_models._loaded.cache_clear()
+    for name in [name for name in sys.modules if name.startswith("mine_")]:
+        del sys.modules[name]
 
 
 def refused(error: str, *texts: object) -> None:
@@ -219,19 +225,22 @@ def test_changed_weights_are_said_and_strictly_refused(
 ) -> None:
     job = write(tmp_path / "a", before="W = np.load(HERE / 'W.npy')", more="* W[0]")
     np.save(tmp_path / "a" / "W.npy", np.zeros(6))
-    words = (job, "--out", tmp_path / "o", *SERIAL)
-    assert run(tmp_path, "run", *words).returncode == 0
+    words = ["run", str(job), "--out", str(tmp_path / "o"), *SERIAL]
+    assert main(words) == 0
     store = Store.open(tmp_path / "o" / "store.zarr")
     store.discard_block(1)
     np.save(tmp_path / "a" / "W.npy", np.ones(6))
     before = store.ledger()["digest"].tolist()
-    done = run(tmp_path, "run", *words, "--strict")
-    assert done.returncode == 2
-    refused(done.stderr, "--strict", "W.npy", "mine_code.W: float64 (6,)")
+    edited()
+    capsys.readouterr()
+    assert main([*words, "--strict"]) == 2
+    error = capsys.readouterr().err
+    assert "Traceback" not in error
+    refused(error.splitlines(True)[-1], "--strict", "W.npy", "mine_code.W: float64 (6,)")
     assert store.ledger()["digest"].tolist() == before
-    done = run(tmp_path, "run", *words)
-    assert done.returncode == 0
-    assert "warning: run 1 had other mine_code.W: float64 (6,) " in done.stdout + done.stderr
+    assert main(words) == 0
+    found = capsys.readouterr()
+    assert "warning: run 1 had other mine_code.W: float64 (6,) " in found.out + found.err
 
 
 def test_a_store_is_read_without_its_module(
@@ -346,6 +355,7 @@ def test_a_store_of_int16_goes_on_where_the_job_says_nothing(
     assert "keep may not change" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_modules_of_the_current_folder_shadow_no_library(tmp_path: Path) -> None:
     for name in ("numpy", "json", "socket", "typing", "zarr", "colorsys", "numba"):
         (tmp_path / f"{name}.py").write_text("raise RuntimeError('not the library')\n")
