@@ -270,6 +270,8 @@ def command(arguments: Iterator[str]) -> int:
     from chimera_hpc.sweep import main
 
     sys.argv = ["sweep", *arguments]
+    # The model is imported as a new process would.
+    sys.modules.pop("trouble", None)
     return int(main())
 
 
