@@ -12,6 +12,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.cli.arguments import add, errors_in_one_line, flag, store_path, value
+from chimera_hpc.job.user_models import prints_to_stderr
 
 if TYPE_CHECKING:
     from chimera_hpc.reduction.audit import Sample
@@ -51,7 +52,7 @@ def execute(args: Namespace) -> int:
     from chimera_hpc.reduction.audit import audit_sweep
     from chimera_hpc.reduction.audit_text import audit_lines
 
-    with errors_in_one_line(args.folder):
+    with errors_in_one_line(args.folder), prints_to_stderr():
         audit = audit_sweep(folder, sample, workers=workers, on_piece=_progress)
         made = [] if args.no_figures else _draw(folder)
     _print(audit, [] if args.json else [*audit_lines(audit), *made], args.json)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.streams import initial_stream, stream_key
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.user_models import prints_to_stderr
 from chimera_hpc.models.custom import OwnPoint
 from chimera_hpc.models.protocol import Model, Row
 
@@ -25,7 +26,8 @@ def initial_state(sweep: Sweep, row: Row, model: Model, nudge: float = 0.0) -> t
     Returns u (N0,) and v (n_second,).
     """
     stream = initial_stream(*stream_key(sweep.model, sweep.n_nodes, row))
-    drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
+    with prints_to_stderr():
+        drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
     if drawn is None:
         drawn = _in_the_ball(sweep, row, model, stream)
     return (_moved(drawn[0], nudge, stream), _moved(drawn[1], nudge, stream)) if nudge else drawn
