@@ -258,7 +258,7 @@ def test_a_store_is_read_without_its_module(
         ("reduce", out, "--no-figures"),
         ("verify", out, "--stored"),
         ("export", out, "--to", tmp_path / "o.csv"),
-        ("merge", out, "--out", tmp_path / "merged"),
+        ("merge", out, out, "--out", tmp_path / "merged"),
     ):
         assert main([str(word) for word in words]) == 0, capsys.readouterr().err
     assert Store.open(tmp_path / "merged" / "store.zarr").n_points == 4
