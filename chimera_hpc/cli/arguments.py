@@ -14,6 +14,7 @@ from chimera_hpc.base.renaming import warn
 from chimera_hpc.base.wording import short
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.parameters import DELTA, SEED
+from chimera_hpc.job.reading import apply_overrides
 from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.job.shipped import job_file
 from chimera_hpc.job.tables import Slurm
@@ -203,10 +204,14 @@ def slurm_options_of(args: Namespace, sweep: Sweep) -> Slurm:
 
 
 def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> Sweep:
-    """Read a job file with its overrides."""
+    """Read a job file, or what the store in a sweep's folder says, with its overrides."""
     if block is not None:
         overrides = [*overrides, f"run.block={block}"]
-    sweep = Sweep.load(job, overrides=overrides)
+    sweep = _of_store(job, overrides) if job.is_dir() else Sweep.load(job, overrides=overrides)
+    if sweep.reduction.names != "triplet":
+        from chimera_hpc.classify.naming import base_size
+
+        base_size(sweep.reduction.names)
     if ":" in sweep.model:
         from chimera_hpc.run.check_model import check_user_model
 
@@ -220,8 +225,17 @@ def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> S
     return sweep
 
 
-def sweep_folder(out: Path | None, sweep: Sweep) -> Path:
-    """Return the folder of a sweep that may not exist yet, absolute."""
+def _of_store(folder: Path, overrides: Sequence[str]) -> Sweep:
+    from chimera_hpc.store.store import Store
+
+    data = Store.open(store_path(folder)).sweep.to_dict()
+    return Sweep.from_dict(apply_overrides(data, overrides), where=str(folder))
+
+
+def sweep_folder(out: Path | None, sweep: Sweep, job: Path) -> Path:
+    """Return the folder of a sweep that may not exist yet, absolute; `job` may be that folder."""
+    if out is None and job.is_dir():
+        return store_path(job).parent.absolute()
     return (out or Path("results") / sweep.name).absolute()
 
 

@@ -11,10 +11,11 @@ from chimera_hpc.cli.estimate import estimate, refuse_absurd
 EPILOG = """examples:
   python -m chimera_hpc.sweep extend jobs/quickstart.toml --set seeds=40
   python -m chimera_hpc.sweep extend jobs/quickstart.toml --set P=2:30 --out results/quickstart
+  python -m chimera_hpc.sweep extend results/quickstart --set seeds=40
 
-The job, with what is set, must hold all points of the sweep and may differ in its axes only. The
-new points stand behind the old ones, which are not touched; `run`, with the old job or the new one,
-computes them.
+Instead of a job file the sweep's folder may stand: its store holds the whole job. The job, with
+what is set, must hold all points of the sweep and may differ in its axes only. The new points stand
+behind the old ones, which are not touched; `run DIR` computes them.
 """
 
 
@@ -24,7 +25,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def execute(args: Namespace) -> int:
     sweep = load_job(args.job, args.overrides)
-    folder = sweep_folder(args.out, sweep)
+    folder = sweep_folder(args.out, sweep, args.job)
     path = store_path(folder)
     refuse_absurd(sweep, estimate(sweep), folder, args.yes)
     from chimera_hpc.store.store import Store
@@ -35,5 +36,5 @@ def execute(args: Namespace) -> int:
     more = after.n_points - before.n_points
     print(f"{more} points added, {after.n_points} in all, in {after.n_blocks} blocks")
     if more:
-        print(f"to compute them: run {args.job} --out {folder}")
+        print(f"to compute them: run {folder}")
     return Exit.COMPLETE

@@ -25,7 +25,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def execute(args: Namespace) -> int:
     sweep = load_job(args.job, args.overrides, args.block)
     check_drawing(sweep)
-    folder = sweep_folder(args.out, sweep)
+    folder = sweep_folder(args.out, sweep, args.job)
     need = estimate(sweep)
     print(f"sweep       {sweep.name} ({sweep.model}), digest {sweep.digest}")
     print(f"axes        {', '.join(need.axes)}")

@@ -33,6 +33,7 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep run jobs/quickstart.toml
   python -m chimera_hpc.sweep run jobs/quickstart.toml --workers 4 --out /scratch/me/quick
   python -m chimera_hpc.sweep run jobs/quickstart.toml --set P=10:14 --set seeds=100 --out more
+  python -m chimera_hpc.sweep run results/quickstart                       its store holds the job
 
 The same command again goes on where the sweep stopped, however it stopped. Points that ran out of
 time or memory are tried run.attempts times in all; `retry` tries failed points once more.
@@ -50,7 +51,7 @@ def execute(args: Namespace) -> int:
         try:
             start_early(args)
             sweep = load_job(args.job, args.overrides, args.block)
-            folder = sweep_folder(args.out, sweep)
+            folder = sweep_folder(args.out, sweep, args.job)
             executor = executor_of(args, sweep, folder / STORE)
             store = open_or_plan(folder, sweep, args.yes)
             from chimera_hpc.run.messages import RetryPolicy

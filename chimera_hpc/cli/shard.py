@@ -88,7 +88,7 @@ def _store_path(folder: Path, out: Path | None, overrides: list[str]) -> Path:
             raise BadInput(f"--set: {folder} is planned already; it goes with a job file only")
         return store_path(folder.absolute())
     sweep = load_job(folder, overrides)
-    place = sweep_folder(out, sweep)
+    place = sweep_folder(out, sweep, folder)
     try:
         return open_or_plan(place, sweep, yes=False).path
     except BadInput:

@@ -159,6 +159,9 @@ def _draw(
     from chimera_hpc.reduction.replay import has_nullcline, window_spectrum
 
     figures: dict[str, Figure] = {}
+    # Pictures of another node or window than the default are files of their own.
+    at_window = f"-window{window}" if window else ""
+    at_node = "" if node == store.sweep.features.reference_node else f"-node{node}"
     seen = [run for run in runs if np.isfinite(run.u).any()]
     if seen:
         length = seen[0].t[-1] - seen[0].t[0]
@@ -173,7 +176,7 @@ def _draw(
             [profiles_of(run.features) for run in measured], titles
         )
     if np.isfinite(focus.u).all():
-        figures["portrait"] = ring_portrait(
+        figures[f"portrait{at_node}"] = ring_portrait(
             *(focus.t, focus.u, focus.w, node),
             title=focus.title,
             nullcline=has_nullcline(store.sweep),
@@ -183,7 +186,9 @@ def _draw(
         settings = store.sweep.features
         data, text = window_spectrum(focus.t, focus.u, settings, node, window)
         print(text)
-        figures["spectrum"] = spectrum(data, f"node {node + 1}, window {window + 1}")
+        figures[f"spectrum{at_node}{at_window}"] = spectrum(
+            data, f"node {node + 1}, window {window + 1}"
+        )
     with errors_in_one_line(folder):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]

@@ -83,7 +83,7 @@ def _check_times(args: Namespace, slurm_options: Slurm) -> None:
 
 
 def _target(args: Namespace, sweep: Sweep) -> Target:
-    folder = sweep_folder(args.out, sweep)
+    folder = sweep_folder(args.out, sweep, args.job)
     overrides = [*args.overrides, *([f"run.block={args.block}"] if args.block else [])]
     planned = args.submit or (folder / LOGS).is_dir()
     return Target(

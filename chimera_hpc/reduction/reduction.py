@@ -90,8 +90,10 @@ def reduce_sweep(
     store = Store.open(folder / STORE_NAME)
     work = _Work(folder, store, say)
     work.classify(curves, claims)
-    figures = work.draw() if make_figures else ()
+    figures = work.draw() if make_figures and work.unwritten is None else ()
     work.tell(figures)
+    if work.unwritten is not None:
+        raise work.unwritten
     return Summary(
         points=work.results["points"],
         table=work.table,
@@ -109,6 +111,7 @@ class _Work:
         check_selections(store.sweep, store.points)
         self.folder, self.store, self._say = folder, store, say
         self.notes: list[str] = []
+        self.unwritten: OSError | None = None
         self.ledger = store.ledger()
         self.status = self.ledger["status"]
         self.scalars, self.quality = store.scalars(), store.quality()
@@ -150,8 +153,12 @@ class _Work:
         self.results |= audit
         if line:
             self.note(line)
-        store.write_reduction(*self._variables())
-        write_atomically(self.folder / RESULTS, to_json(self.results).encode())
+        try:
+            store.write_reduction(*self._variables())
+            write_atomically(self.folder / RESULTS, to_json(self.results).encode())
+        except OSError as error:
+            # What was found is said all the same.
+            self.unwritten = error
         self._say(_coverage(self.results["points"]))
         self._explain_missing_classes()
         r_squared = self.quality["r_squared"]
@@ -283,7 +290,8 @@ class _Work:
         for line in self.results["warnings"]:
             self.note(f"warning: {line}")
         self._say(f"store    {self.store.path}")
-        self._say(f"results  {self.folder / RESULTS}")
+        if self.unwritten is None:
+            self._say(f"results  {self.folder / RESULTS}")
         if figures:
             stems = dict.fromkeys(path.stem for path in figures)
             self._say(f"figures  {self.folder / FIGURES}: {', '.join(stems)} (PNG and PDF)")

@@ -58,7 +58,7 @@ def extend(path: Path, sweeps: Sequence[Sweep], sweep: Sweep, block_size: int) -
     if sweep.digest == sweeps[-1].digest:
         return
     old = points_of(sweeps)
-    _check_extension(path, sweeps[-1], old, sweep)
+    check_extension(path, sweeps[-1], old, sweep)
     new = points_of([*sweeps, sweep])
     stored = _stored_columns(path, new)
     for folder in (*stored, *BLOCK_ARRAYS):
@@ -101,7 +101,8 @@ def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: P
     return done + ([f"{len(broken_off)} temporary files removed"] if broken_off else [])
 
 
-def _check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> None:
+def check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> None:
+    """Raise BadInput unless `sweep` holds all points of a store and differs in its axes only."""
     changed = [name for name in SAME_TABLES if getattr(sweep, name) != getattr(before, name)]
     if sweep.n_nodes != before.n_nodes:
         changed.append("fixed.n_nodes")

@@ -21,7 +21,7 @@ from chimera_hpc.store.blocks import BlockFiles, Damage
 from chimera_hpc.store.check import find_damaged, shallow_damage
 from chimera_hpc.store.claims import FOLDER as CLAIMS
 from chimera_hpc.store.claims import Claim, remove_stale
-from chimera_hpc.store.extend import exclusive, extend, repair_metadata
+from chimera_hpc.store.extend import check_extension, exclusive, extend, repair_metadata
 from chimera_hpc.store.ledger import (
     FAILED,
     NO_LIMIT,
@@ -120,10 +120,19 @@ class Store:
         """
         if sweep.digest not in {known.digest for known in self.sweeps}:
             lines = "; ".join(sweep.explain_difference(self.sweep))
-            raise BadInput(f"{self.path}: holds another sweep: {lines}")
+            hint = "; to add its points to this store: extend" if self._is_part_of(sweep) else ""
+            raise BadInput(f"{self.path}: holds another sweep: {lines}{hint}")
         if not sweep.keep.fits(self.sweep.keep):
             kept = f"series={self.sweep.keep.series}, dtype={self.sweep.keep.dtype}"
             raise BadInput(f"{self.path}: keep may not change within one store, it has {kept}")
+
+    def _is_part_of(self, sweep: Sweep) -> bool:
+        """Tell whether `sweep` would be an extension of the store."""
+        try:
+            check_extension(self.path, self.sweeps[-1], self.points, sweep)
+        except BadInput:
+            return False
+        return True
 
     def adopt(self, sweep: Sweep) -> Self:
         """Check the sweep, take over what may change between runs, and return the store."""

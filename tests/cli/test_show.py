@@ -177,3 +177,17 @@ def test_spectrum_is_that_of_the_window_that_the_features_come_from(store: Store
     names = ("n_peaks", "n_overlap", "window_reference", "reference_node")
     features = fourier_features(t, u, **{name: getattr(settings, name) for name in names})
     assert features.frequency[1] == pytest.approx(vertex(data)[0], rel=1e-6)
+
+
+def test_pictures_of_other_nodes_and_windows_are_files_of_their_own(
+    finished: Path, store: Store, sweep: Sweep
+) -> None:
+    i = oscillating(store)
+    pictures: list[Path] = []
+    for options in ((), ("--node", "3"), ("--node", "3", "--window", "1")):
+        code, out, _ = sweep("show", finished, *words(store, i), *options)
+        assert code == 0
+        pictures += [Path(line[9:]) for line in out.splitlines() if line.endswith(".png")]
+    chosen = [p.name for p in pictures if "portrait" in p.name or "spectrum" in p.name]
+    assert len({name for name in chosen if "spectrum" in name}) == 3
+    assert len({name for name in chosen if "portrait" in name}) == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import os
 import zipfile
@@ -328,6 +329,43 @@ def test_merge_does_not_touch_a_store_that_exists(
     assert code == 2
     assert "exists already" in err
     assert contents(finished) == before
+
+
+def test_folder_of_a_sweep_stands_for_its_job(
+    finished: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = sweep("run", finished, "--cluster", "serial", "--no-figures")
+    assert code == 0
+    assert "nothing to compute" in out
+    code, _, err = sweep("run", finished, "--set", "seeds=7")
+    assert code == 2
+    assert "seeds: 7 here, 5 in the store; to add its points to this store: extend" in err
+    code, out, _ = sweep("extend", finished, "--set", "seeds=7")
+    assert code == 0
+    assert f"to compute them: run {finished}" in out
+    assert store_of(finished).n_points == 21
+    assert not (tmp_path / "results").exists()
+
+
+def test_names_of_classes_are_checked_before_anything_runs(job: Path, sweep: Run) -> None:
+    code, _, err = sweep("plan", job, "--set", 'reduction.names=["steady","moving"]')
+    assert code == 2
+    assert "reduction.names holds 'steady'" in err
+
+
+def test_reduction_of_a_folder_that_cannot_be_written_is_said(
+    finished: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system", "store.zarr")
+
+    monkeypatch.setattr(Store, "write_reduction", refuse)
+    code, out, err = sweep("reduce", finished)
+    assert code == 2
+    assert "15 of 15 points run" in out
+    assert "votes" in out
+    assert "store.zarr: can't be written: Read-only file system" in err
 
 
 # export

@@ -165,6 +165,15 @@ def test_other_spec_is_refused_with_the_keys_that_differ(store: Store) -> None:
         store.check_spec(small_sweep("keep.dtype=float32"))
 
 
+def test_sweep_with_more_points_is_told_to_extend(store: Store) -> None:
+    with pytest.raises(BadInput, match=r"seeds: 7 here, 5 in the store.*: extend$"):
+        store.check_spec(small_sweep("seeds=7"))
+    for other in ("seeds=3", "P=3:4", "integrator.rtol=1e-6"):
+        with pytest.raises(BadInput, match=r"holds another sweep") as caught:
+            store.check_spec(small_sweep(other))
+        assert "extend" not in str(caught.value)
+
+
 def test_what_is_outside_the_digest_may_change(store: Store) -> None:
     changed = small_sweep("run.workers=3", 'reduction.linkage="average"', "keep.series=all")
     adopted = store.adopt(changed)
