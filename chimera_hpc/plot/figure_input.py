@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.classify.classification import Classification
-from chimera_hpc.measures.fourier import FEATURES as LABELS
+from chimera_hpc.plot.raster import NodeSeries
 
 Array = NDArray[np.float64]
-
-_PERIODS = 12
-"""Periods in the close-up of a run."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +23,8 @@ class DrawnRun:
     """Parameters and seed."""
     t: Array
     """(T,) uniform"""
-    u: Array
-    """(T, N)"""
+    u: NodeSeries
+    """(N, T)"""
     class_name: str = ""
     features: Array | None = None
     """(8, N) in the order of `measures.fourier.FEATURES`; None where the run has none."""
@@ -38,24 +35,6 @@ class DrawnRun:
     def title(self) -> str:
         """Place and class, a line each."""
         return "\n".join(filter(None, [self.place, self.class_name]))
-
-    @property
-    def frequency(self) -> float:
-        """Median over the nodes, NaN without features."""
-        if self.features is None:
-            return float("nan")
-        return float(np.median(self.features[LABELS.index("frequency")]))
-
-    @property
-    def close_up(self) -> float:
-        """Time of the last twelve periods, at most half of the series."""
-        half = 0.5 * float(self.t[-1] - self.t[0])
-        return min(_PERIODS / self.frequency, half) if self.frequency > 0.0 else half
-
-    @property
-    def is_fast(self) -> bool:
-        """Whether twelve periods take less than half of the series, so that the whole blurs."""
-        return self.close_up < 0.5 * float(self.t[-1] - self.t[0])
 
 
 @dataclass(frozen=True)

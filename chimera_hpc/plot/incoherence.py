@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import FigureInput, numbers
-from chimera_hpc.plot.spacetime import Panel, draw_u, last_part
+from chimera_hpc.plot.raster import Raster, close_up
+from chimera_hpc.plot.spacetime import draw_raster
 
 _KINDS = (("SI = 0", style.RED), ("0 < SI < 1", style.BLUE), ("SI = 1", style.BLACK))
 
@@ -31,8 +32,7 @@ def incoherence_figure(data: FigureInput) -> Figure | None:
     ]
     dynamics = None
     if data.shown:
-        run = data.shown[-1]
-        dynamics = last_part(run.t, run.u, run.close_up) if run.is_fast else (run.t, run.u)
+        dynamics = close_up(data.shown[-1].t, data.shown[-1].u)
     return incoherence(panels, label=label, dynamics=dynamics)
 
 
@@ -58,17 +58,16 @@ class Strengths:
 
 @style.styled
 def incoherence(
-    panels: Sequence[Strengths], *, label: str = "$P$", dynamics: Panel | None = None
+    panels: Sequence[Strengths], *, label: str = "$P$", dynamics: Raster | None = None
 ) -> Figure:
-    """Draw SI as squares: red at 0, blue between, black at 1; and, if given, (t, u) of one run."""
+    """Draw SI as squares: red at 0, blue between, black at 1; and, if given, one run."""
     count = len(panels) + (dynamics is not None)
     figure, axes = style.new_panels(count, max(style.COLUMN + 0.6, 2.5 * count), 2.6)
     for frame, panel in zip(axes, panels, strict=False):
         _draw_strength(frame, panel, label)
     axes[0].set_ylabel("strength of incoherence SI")
     if dynamics is not None:
-        largest = float(np.nanmax(np.abs(np.asarray(dynamics[1]))))
-        image = draw_u(axes[-1], *dynamics, largest)
+        image = draw_raster(axes[-1], dynamics, float(np.nanmax(np.abs(dynamics.values))))
         axes[-1].set_xlabel("time $t$")
         axes[-1].set_ylabel("node $i$")
         figure.colorbar(image, ax=axes[-1], label="$u_i(t)$")

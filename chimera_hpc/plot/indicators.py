@@ -8,11 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from chimera_hpc.measures.fourier import FEATURES
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
+from chimera_hpc.plot.raster import bins
 
 
 def indicators_figure(data: FigureInput) -> Figure | None:
@@ -25,9 +27,16 @@ def indicators_figure(data: FigureInput) -> Figure | None:
 
 
 def _variations(run: DrawnRun) -> str:
-    if run.triplet is None:
-        return ""
-    return f"\n$V$ = ({', '.join(f'{value:.3f}' for value in run.triplet)})"
+    return "" if run.triplet is None else f"\n{variations_text(run.triplet)}"
+
+
+def variations_text(triplet: ArrayLike) -> str:
+    """Return the three variations with their symbols, on two lines."""
+    values = np.asarray(triplet, dtype=np.float64)
+    phase, amplitude, frequency = (
+        f"${symbol}$ = {value:.3f}" for symbol, value in zip(SYMBOLS, values, strict=True)
+    )
+    return f"{phase}, {amplitude},\n{frequency}"
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,9 @@ def profiles_of(features: ArrayLike) -> IndicatorProfiles:
     return IndicatorProfiles(**{name: rows[name] for name in names})
 
 
+STEPS = 400
+"""Most nodes that are drawn one by one; of more, as many steps are drawn."""
+SYMBOLS = (r"V_\theta", "V_a", r"V_\Omega")
 _ROWS = (
     ("phase", r"$\langle\theta_i\rangle$ (rad)"),
     ("amplitude", r"$\langle a_i\rangle$"),
@@ -57,8 +69,13 @@ _ROWS = (
 
 
 @style.styled
-def fourier_indicators(runs: Sequence[IndicatorProfiles], titles: Sequence[str] = ()) -> Figure:
-    """Draw a column for each run: means as dots, one standard deviation to each side as a band."""
+def fourier_indicators(
+    runs: Sequence[IndicatorProfiles], titles: Sequence[str] = (), names: Sequence[str] = ()
+) -> Figure:
+    """Draw a column for each run: means as dots, one standard deviation to each side as a band.
+
+    `names` (N,) of the nodes stand along their axis, by default their numbers from 0.
+    """
     figure = style.new_figure(max(style.COLUMN, 2.35 * len(runs)), 4.6)
     axes = figure.subplots(3, len(runs), squeeze=False, sharex="col")
     for j, run in enumerate(runs):
@@ -70,7 +87,9 @@ def fourier_indicators(runs: Sequence[IndicatorProfiles], titles: Sequence[str] 
         axes[0, j].set_ylim(-np.pi - 0.3, np.pi + 0.3)
         axes[0, j].set_yticks([-np.pi, 0.0, np.pi], [r"$-\pi$", "0", r"$\pi$"])
         axes[0, j].set_title(titles[j] if j < len(titles) else "")
-        axes[2, j].set_xlabel("node $i$")
+        axes[2, j].set_xlabel("node" if names else "node $i$")
+        if names:
+            style.name_nodes(axes[2, j].xaxis, names, rotation=90)
     style.letter(list(axes[0]))
     figure.align_ylabels(axes)
     return figure
@@ -79,22 +98,25 @@ def fourier_indicators(runs: Sequence[IndicatorProfiles], titles: Sequence[str] 
 def _draw_profile(axes: Axes, mean: ArrayLike, deviation: ArrayLike, period: float) -> None:
     """Draw dots and, where the deviation is known (two windows or more), the band.
 
-    A quantity with a period (0: none) has its band repeated one period above and below.
+    A quantity with a period (0: none) has its band repeated one period above and below. Of many
+    nodes, what a few of them reach is drawn as one step: their means dark, the band light.
     """
     values = np.asarray(mean, dtype=np.float64)
     half = np.asarray(deviation, dtype=np.float64)
-    node = np.arange(1, len(values) + 1)
+    starts = bins(len(values), STEPS)
+    edges = np.append(starts, len(values)) - 0.5
+    light = style.lighten(style.BLUE, 0.7)
     axes.use_sticky_edges = False  # else the lowest band would lie on the frame
+    low, high = (np.fmin.reduceat(values - half, starts), np.fmax.reduceat(values + half, starts))
     for shift in (0.0, -period, period) if period else (0.0,):
-        axes.stairs(
-            values + shift + half,
-            np.arange(len(values) + 1) + 0.5,
-            baseline=values + shift - half,
-            fill=True,
-            color=style.lighten(style.BLUE, 0.7),
-        )
-    axes.plot(node, values, ".", color=style.BLUE, markersize=4.0)
-    axes.set_xlim(0, len(values) + 1)
+        axes.stairs(high + shift, edges, baseline=low + shift, fill=True, color=light)
+    if len(starts) == len(values):
+        axes.plot(starts, values, ".", color=style.BLUE, markersize=4.0)
+    else:
+        low, high = np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
+        axes.stairs(high, edges, baseline=low, fill=True, color=style.BLUE, linewidth=0.5)
+    axes.set_xlim(-1, len(values))
+    axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], integer=True))
     spread = np.nanmax(values) - np.nanmin(values)
     if spread < 1e-3 * max(1.0, float(np.nanmax(np.abs(values)))):
         # Rounding would fill the panel and look like structure.

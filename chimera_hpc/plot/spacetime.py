@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,16 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
+from chimera_hpc.plot.raster import NodeSeries, Raster, close_up, overview
 
-Panel = tuple[ArrayLike, ArrayLike]
+Panel = tuple[ArrayLike, NodeSeries]
+"""Times (T,), uniform, and u (N, T)."""
+
+_MOST_PERIODS = 72
+"""Periods that can be told apart over the width of a page."""
 
 
 def space_time_figure(data: FigureInput) -> Figure | None:
     """Draw u over node and time for the runs to show, with a close-up (paper fig:9dyn)."""
-    if not data.shown:
-        return None
-    fast = any(run.is_fast for run in data.shown)
-    return _of_runs(data.shown, [run.close_up for run in data.shown] if fast else None)
+    return _of_runs(data.shown) if data.shown else None
 
 
 def whole_run_figure(data: FigureInput) -> Figure | None:
@@ -30,8 +32,8 @@ def whole_run_figure(data: FigureInput) -> Figure | None:
     return _of_runs(data.whole) if data.whole else None
 
 
-def _of_runs(runs: Sequence[DrawnRun], zoom: Sequence[float] | None = None) -> Figure:
-    return space_time([(run.t, run.u) for run in runs], [run.title for run in runs], zoom=zoom)
+def _of_runs(runs: Sequence[DrawnRun]) -> Figure:
+    return space_time([(run.t, run.u) for run in runs], [run.title for run in runs])
 
 
 @style.styled
@@ -40,65 +42,79 @@ def space_time(
     titles: Sequence[str] = (),
     *,
     columns: int = 3,
-    zoom: float | Sequence[float] | None = None,
     symbol: str = "u_i(t)",
+    names: Sequence[str] = (),
 ) -> Figure:
-    """Draw one panel for each (t, u): t (T,) uniform, u (T, N); one colour scale for all.
+    """Draw one panel for each (t, u): t (T,) uniform, u (N, T); one colour scale for all.
 
-    `zoom` adds below each panel its last `zoom` time units, the same for all or one for each: fast
-    oscillations blur in print when the window holds more periods than the panel has dots.
+    Where a series holds more periods than a panel can show, the panel has the range of u in each
+    period, and below each panel are the last twelve periods of its run. `names` (N,) of the nodes
+    stand along their axis, by default their numbers from 0.
     """
     columns = 2 if len(panels) == 4 and columns > 2 else min(columns, len(panels))
-    closer = [zoom] * len(panels) if zoom is None or isinstance(zoom, int | float) else list(zoom)
-    rows = -(-len(panels) // columns)
-    parts = 1 if zoom is None else 2
-    width = style.PAGE if columns > 1 else style.COLUMN + 0.6
-    figure = style.new_figure(width, 0.35 + 1.95 * rows * parts)
-    axes = figure.subplots(rows * parts, columns, squeeze=False, sharey=True)
-    largest = max(float(np.nanmax(np.abs(np.asarray(u)))) for _, u in panels)
-    for i, panel in enumerate(panels):
-        row, column = parts * (i // columns), i % columns
-        image = draw_u(axes[row, column], *panel, largest)
-        axes[row, column].set_title(titles[i] if i < len(titles) else "")
-        if (duration := closer[i]) is not None:
-            draw_u(axes[row + 1, column], *last_part(*panel, duration), largest)
-    for empty in (
-        axes.reshape(rows, parts, columns).swapaxes(1, 2).reshape(-1, parts)[len(panels) :]
-    ):
-        for spare in empty:
-            spare.set_axis_off()
-    style.letter([axes[parts * (i // columns), i % columns] for i in range(len(panels))])
+    upper = [overview(t, u, _MOST_PERIODS / columns) for t, u in panels]
+    coarse = any(raster.is_range or raster.partly for raster in upper)
+    lower = [close_up(t, u) for t, u in panels] if coarse else []
+    rows, parts = -(-len(panels) // columns), 2 if coarse else 1
+    width = style.PAGE if columns > 1 else style.COLUMN + 1.2
+    figure = style.new_figure(width, 0.35 + (2.05 if coarse else 1.95) * rows * parts)
+    axes = figure.subplots(rows * parts, columns, squeeze=False)
+    place = [(parts * (i // columns), i % columns) for i in range(len(panels))]
+    scales = {kind: _largest((*upper, *lower), kind) for kind in (False, True)}
+    for frame in axes.flat:
+        frame.set_axis_off()
+    for i, (row, column) in enumerate(place):
+        lines = [titles[i] if i < len(titles) else "", upper[i].partly]
+        axes[row, column].set_title("\n".join(filter(None, lines)))
+        draw_raster(axes[row, column], upper[i], scales[upper[i].is_range], names)
+        if coarse:
+            axes[row + 1, column].set_title(lower[i].length, loc="left", fontsize="small")
+            draw_raster(axes[row + 1, column], lower[i], scales[False], names)
     for left in axes[:, 0]:
-        left.set_ylabel("node $i$")
-    for bottom in axes[-1]:
-        bottom.set_xlabel("time $t$")
-    figure.colorbar(image, ax=axes, label=f"${symbol}$", fraction=0.03, pad=0.01)
+        left.set_ylabel("node $i$" if not names else "node")
+    for i, (row, column) in enumerate(place):
+        if i + columns >= len(panels):
+            axes[row + parts - 1, column].set_xlabel("time $t$")
+    _add_bars(figure, axes, symbol, apart=coarse and rows == 1)
+    style.letter([axes[here] for here in place])
     return figure
 
 
-def last_part(
-    t: ArrayLike, u: ArrayLike, duration: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the samples of the last `duration` time units."""
-    time = np.asarray(t, dtype=np.float64)
-    kept = time >= time[-1] - duration
-    return time[kept], np.asarray(u, dtype=np.float64)[kept]
+def draw_raster(axes: Axes, raster: Raster, largest: float, names: Sequence[str] = ()) -> AxesImage:
+    """Draw dots, time along x and node 0 at the bottom; u has colours from -largest to largest.
 
-
-def draw_u(axes: Axes, t: ArrayLike, u: ArrayLike, largest: float) -> AxesImage:
-    """Draw u (T, N), time along x and node 1 at the bottom; colours from -largest to largest."""
-    time = np.asarray(t, dtype=np.float64)
-    values = np.asarray(u, dtype=np.float64)
-    half = 0.5 * (time[1] - time[0]) if len(time) > 1 else 0.5
+    A range has other colours, from 0 to largest.
+    """
+    axes.set_axis_on()
     # Few labels, so that those of neighbouring panels stay apart.
     axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    return axes.imshow(
-        values.T,
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10], integer=True))
+    image = axes.imshow(
+        raster.values,
         aspect="auto",
         origin="lower",
-        extent=(time[0] - half, time[-1] + half, 0.5, values.shape[1] + 0.5),
-        vmin=-largest,
+        extent=(*raster.times, raster.nodes[0] - 0.5, raster.nodes[1] - 0.5),
+        vmin=0.0 if raster.is_range else -largest,
         vmax=largest,
-        cmap="viridis",
+        cmap="magma" if raster.is_range else "viridis",
         interpolation_stage="data",
     )
+    if names:
+        style.name_nodes(axes.yaxis, names[: raster.nodes[1]])
+    return image
+
+
+def _largest(rasters: Iterable[Raster], is_range: bool) -> float:
+    """Return the largest absolute value of u, or of its range."""
+    values = [raster.values for raster in rasters if raster.is_range == is_range]
+    return max((float(np.nanmax(np.abs(v), initial=0.0)) for v in values), default=0.0) or 1.0
+
+
+def _add_bars(figure: Figure, axes: NDArray[np.object_], symbol: str, apart: bool) -> None:
+    """Put a bar of colours for u, and one for its range, next to all panels or to their own row."""
+    labels = {"viridis": f"${symbol}$", "magma": f"range of ${symbol}$ in a period"}
+    images = [frame.images[0] for frame in axes.flat if frame.images]
+    kinds = {image.get_cmap().name: image for image in images}
+    for name in sorted(kinds):
+        parents = axes[0 if name == "magma" else 1] if apart and len(kinds) > 1 else axes
+        figure.colorbar(kinds[name], ax=parents, label=labels[name], fraction=0.03, pad=0.01)

@@ -63,6 +63,8 @@ SETTINGS: Any = {
     "figure.constrained_layout.h_pad": 0.05,
 }
 
+_MOST_NAMES = 12
+
 Arguments = ParamSpec("Arguments")
 Made = TypeVar("Made")
 
@@ -121,6 +123,17 @@ def set_ticks(axis: Axis, values: ArrayLike, **rules: Any) -> None:
     data = np.asarray(values, float)
     whole = bool(np.all(data == np.rint(data)))
     axis.set_major_locator(MaxNLocator(**{"integer": whole, **rules}))
+
+
+def name_nodes(axis: Axis, names: Sequence[str], **look: Any) -> None:
+    """Put the names of nodes, a dozen at most, at their numbers along an axis."""
+    ticks = np.unique(np.linspace(0, len(names) - 1, min(_MOST_NAMES, len(names))).astype(int))
+    axis.set_ticks(ticks.tolist(), [plain(names[i]) for i in ticks], **look)
+
+
+def plain(text: str) -> str:
+    """Keep dollars of a text that is drawn from beginning a formula."""
+    return text.replace("$", r"\$")
 
 
 def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:

@@ -37,7 +37,7 @@ def signal_figure(data: FigureInput) -> Figure | None:
     if entry is None:
         return None
     signal = entry["signal"]
-    return space_time([(signal["t"], signal["u"])], ["synthetic signal"], symbol="x_j(t)")
+    return space_time([(signal["t"], np.asarray(signal["u"], float).T)], ["synthetic signal"], symbol="x_j(t)")
 
 
 @style.styled
@@ -53,7 +53,7 @@ def reconstruction(truth: Quantities, found: Mapping[str, Quantities]) -> Figure
     for j, (name, symbol, unit) in enumerate(_ROWS):
         top, bottom = axes[0, j], axes[1, j]
         true = np.asarray(truth[name], float)
-        node = np.arange(1, len(true) + 1)
+        node = np.arange(len(true))
         top.plot(
             node, true, "s", color=style.BLACK, markersize=4.5, markerfacecolor="none", label="true"
         )

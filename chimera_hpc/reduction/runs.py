@@ -14,6 +14,7 @@ from chimera_hpc.classify.modes import count_votes
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.tables import Keep
 from chimera_hpc.plot.figure_input import DrawnRun
+from chimera_hpc.plot.raster import NodeSeries
 from chimera_hpc.reduction.cells import FreeAxis, describe
 from chimera_hpc.reduction.selection import find_point, single_point
 from chimera_hpc.store.schema import sample_times, series_mask
@@ -75,7 +76,7 @@ def whole_runs(
         if status.is_failure:
             say(f"not drawn: {text}: {status.sentence}")
             continue
-        runs.append(DrawnRun(_place(points.row(0), axes), sample_times(single), u))
+        runs.append(DrawnRun(_place(points.row(0), axes), sample_times(single), u.T))
     return runs
 
 
@@ -88,8 +89,15 @@ def _load(
     if oscillates:
         block, row = divmod(i, store.block_size)
         features = np.array(store.files.read("features", block)[row])
-    t, u = sample_times(store.sweep), series_of(store, i)
+    t, u = sample_times(store.sweep), node_series(store, i)
     return DrawnRun(place, t, u, class_name, features, triplet if oscillates else None)
+
+
+def node_series(store: Store, i: int) -> NodeSeries:
+    """Return the series of a point node by node; it is computed again where it is not kept."""
+    if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
+        return store.node_series(i)
+    return series_of(store, i).T
 
 
 def series_of(store: Store, i: int) -> Array:

@@ -150,7 +150,7 @@ def projections(made: Sources, largest: Mapping[str, float]) -> dict[str, figure
 def picture(made: Sources, n_nodes: int) -> figure:
     """Return the frame for the space-time picture of a run."""
     plot = _figure(PICTURE, 460, x_range=_range(0.0, 1.0), tools="box_zoom,reset,save")
-    plot.y_range = _range(0.5, n_nodes + 0.5)
+    plot.y_range = _range(-0.5, n_nodes - 0.5)
     plot.xaxis.axis_label, plot.yaxis.axis_label = "time t", "node i"
     plot.grid.visible = False
     plot.image_url("url", "x", "y", "w", "h", source=made["picture"], anchor="bottom_left")
@@ -161,7 +161,7 @@ def profiles(made: Sources, n_nodes: int) -> dict[str, figure]:
     """Return the profiles of the Fourier features over the nodes, plus and minus one deviation."""
     plots = {}
     for name in PROFILES:
-        plot = _figure(name, 200, x_range=_range(0.0, n_nodes + 1.0), tools="box_zoom,reset")
+        plot = _figure(name, 200, x_range=_range(-1.0, n_nodes), tools="box_zoom,reset")
         plot.y_range = _range(0.0, 1.0)
         plot.xaxis.axis_label, plot.yaxis.axis_label = "node i", _WORDS.get(name, name)
         ends = ("node", f"{name}_low", "node", f"{name}_high")

@@ -75,7 +75,6 @@ def payload(content: Content, shown: Shown, plates: Plates, top: TreeTop) -> dic
         "cuts": {str(k): _cut(content, shown, top, k) for k in content.cuts},
         "tree": {"xs": top.xs, "ys": top.ys, "ends": top.ends, "sizes": top.sizes},
         "plates": {str(row_of[i]): plate for i, plate in plates.by_cell.items() if row_of[i] >= 0},
-        "n_nodes": content.store.sweep.n_nodes,
     }
 
 

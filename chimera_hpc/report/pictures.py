@@ -19,6 +19,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.modes import vote_labels
 from chimera_hpc.job.tables import Keep
+from chimera_hpc.plot.raster import NodeSeries, bins, close_up
 from chimera_hpc.report.content import Content
 from chimera_hpc.store.schema import FEATURES, sample_times, series_mask
 
@@ -29,9 +30,11 @@ MOST_BYTES = 5_500_000
 """Cells with a picture and profiles, and what these may take of the page in all."""
 MOST_SECONDS = 20.0
 """Work on replaying runs whose series the store does not keep."""
-_PERIODS = 8.0
+_PERIODS = 8
 _COLUMNS, _ROWS = 240, 128
 """Most samples of a picture along time and along the ring."""
+_STEPS = 256
+"""Most nodes in a profile."""
 _COLOURS = 64
 _PROFILES = ("amplitude", "phase", "frequency")
 _BATCH = 16
@@ -93,7 +96,7 @@ def plates(
     for k, i in enumerate((*pictured, *plain)):
         plate = _plate(content, int(chosen[i]), profiles[int(chosen[i])])
         if k < len(pictured):
-            plate |= _picture(*next(series), profiles[int(chosen[i])])
+            plate |= _picture(*next(series))
         size += len(json.dumps(plate))
         if size > MOST_BYTES:
             break
@@ -141,8 +144,8 @@ def affordable(content: Content) -> int:
     return int(MOST_SECONDS / max(seconds, 1e-6))
 
 
-def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array, Array]]:
-    """Yield (t, u) of points, read or replayed; in the order given."""
+def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array, NodeSeries]]:
+    """Yield times and u node by node of points, read or replayed; in the order given."""
     store, t = content.store, sample_times(content.store.sweep)
     kept = series_mask(store.sweep, store.points.columns["seed"])
     for start in range(0, len(points), _BATCH):
@@ -150,7 +153,7 @@ def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array
         missing = batch[~kept[batch]]
         replayed = dict(zip(missing.tolist(), _replay(content, missing), strict=True))
         for i in batch.tolist():
-            yield t, replayed[i] if i in replayed else store.series(i)
+            yield t, replayed[i].T if i in replayed else store.node_series(i)
 
 
 def _replay(content: Content, points: NDArray[np.int64]) -> Array:
@@ -188,28 +191,30 @@ def _plate(content: Content, i: int, features: Array | None) -> dict[str, Any]:
     }
     if np.isfinite(content.triplets[i]).all():
         plate["variations"] = [rounded(v) for v in content.triplets[i].tolist()]
-    if features is not None:
-        rows = dict(zip(FEATURES, features.tolist(), strict=True))
-        for name in _PROFILES:
-            plate[name] = [rounded(v) for v in rows[name]]
-            plate[f"{name}_std"] = [rounded(v) for v in rows[f"{name}_std"]]
-    return plate
+    return plate if features is None else plate | _profiles(features)
 
 
-def _picture(t: Array, u: Array, features: Array | None) -> dict[str, Any]:
-    """Return the last periods of a run as a PNG with its corners in time and its colour range."""
-    duration = t[-1] - t[0]
-    if features is not None:
-        rate = float(np.median(features[FEATURES.index("frequency")]))
-        duration = min(duration, _PERIODS / max(rate, 1e-12))
-    first = int(np.searchsorted(t, t[-1] - duration))
-    columns = np.linspace(first, len(t) - 1, min(_COLUMNS, len(t) - first)).round().astype(int)
-    nodes = np.linspace(0, u.shape[1] - 1, min(_ROWS, u.shape[1])).round().astype(int)
-    part = u[np.ix_(columns, nodes)]
-    largest = float(np.nanmax(np.abs(u), initial=0.0)) or 1.0
+def _profiles(features: Array) -> dict[str, list[float | None]]:
+    """Return each profile with what lies one deviation below and above, at some nodes of many."""
+    starts, rows = bins(features.shape[1], _STEPS), dict(zip(FEATURES, features, strict=True))
+    made = {"node": starts.astype(np.float64)}
+    for name in _PROFILES:
+        half = np.nan_to_num(rows[f"{name}_std"])
+        made[name] = rows[name][starts]
+        made[f"{name}_low"] = np.fmin.reduceat(rows[name] - half, starts)
+        made[f"{name}_high"] = np.fmax.reduceat(rows[name] + half, starts)
+    return {name: [rounded(v, 6) for v in values.tolist()] for name, values in made.items()}
+
+
+def _picture(t: Array, u: NodeSeries) -> dict[str, Any]:
+    """Return the last periods of a run as a PNG, with what it shows and its colour range."""
+    raster = close_up(t, u, _ROWS, _COLUMNS, _PERIODS)
+    largest = float(np.nanmax(np.abs(raster.values), initial=0.0)) or 1.0
     return {
-        "image": _png(part.T[::-1] / largest),
-        "t": [rounded(float(t[first]), 6), rounded(float(t[-1]), 6)],
+        "image": _png(raster.values[::-1] / largest),
+        "t": [rounded(x, 6) for x in raster.times],
+        "nodes": list(raster.nodes),
+        "part": raster.length,
         "largest": rounded(largest, 3),
     }
 

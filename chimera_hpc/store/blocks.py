@@ -116,6 +116,14 @@ class BlockFiles:
             reason = "missing"
         return Damage(block, name, reason) if reason else None
 
+    def place_of_series(self, block: int, row: int) -> tuple[int, int] | None:
+        """Return offset and bytes of the series of a point in its block's file; None without one."""
+        with self.file("u", block).open("rb") as file:
+            file.seek(-self._index_size(), 2)
+            index = np.frombuffer(file.read(), "<u8", count=2 * self.shapes["u"][0]).reshape(-1, 2)
+        offset, size = index[row].tolist()
+        return None if offset == _ABSENT else (offset, size)
+
     def _encode(self, name: str, chunk: NDArray[Any]) -> bytes:
         if name == "u":
             return self._encode_series(chunk)

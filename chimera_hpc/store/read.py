@@ -30,10 +30,8 @@ def gather(files: BlockFiles, name: str, scan: LedgerScan) -> NDArray[np.float64
 
 def read_series(files: BlockFiles, point: int) -> NDArray[np.float64]:
     """Return u of one point, shape (times, nodes), NaN where a sample is missing."""
+    check_has_run(files, point)
     block, row = divmod(point, files.shapes["u"][0])
-    ledger = read_block(files.path, block, files.shapes["ledger"][0])
-    if ledger is None or table_columns(ledger)["status"][row] == Status.NEVER:
-        raise BadInput(f"{files.path}: point {point} has not been run")
     damage = files.look("u", block)
     if damage:
         raise DamagedChunk(damage)
@@ -44,3 +42,11 @@ def read_series(files: BlockFiles, point: int) -> NDArray[np.float64]:
         # Each codec has its own way to say that bytes are not what it wrote.
         reason = f"point {row} of it cannot be decoded ({type(error).__name__})"
         raise DamagedChunk(Damage(block, "u", reason)) from error
+
+
+def check_has_run(files: BlockFiles, point: int) -> None:
+    """Raise BadInput where a point never ran."""
+    block, row = divmod(point, files.shapes["u"][0])
+    ledger = read_block(files.path, block, files.shapes["ledger"][0])
+    if ledger is None or table_columns(ledger)["status"][row] == Status.NEVER:
+        raise BadInput(f"{files.path}: point {point} has not been run")

@@ -34,11 +34,12 @@ from chimera_hpc.store.ledger import (
     table_columns,
     unfinished,
 )
-from chimera_hpc.store.read import gather, read_series
+from chimera_hpc.store.read import check_has_run, gather, read_series
 from chimera_hpc.store.reduction import StoredReduction, Variable, read_reduction, write_reduction
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import start_run
 from chimera_hpc.store.schema import BLOCK_ARRAYS, OPTIONAL, QUALITY, scalar_labels, series_mask
+from chimera_hpc.store.strips import StoredSeries
 from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
 from chimera_hpc.store.write import Receipt, write_block
 
@@ -315,9 +316,22 @@ class Store:
         Raises BadInput when the series of the point is not kept, or it never ran.
         """
         i = range(self.n_points)[i]
+        self._check_series(i)
+        return read_series(self.files, i)
+
+    def node_series(self, i: int) -> StoredSeries:
+        """Return u of point i node by node, read from the disk as it is asked for.
+
+        Raises BadInput as `series`, and DamagedChunk.
+        """
+        i = range(self.n_points)[i]
+        self._check_series(i)
+        check_has_run(self.files, i)
+        return StoredSeries(self.files, i)
+
+    def _check_series(self, i: int) -> None:
         if not series_mask(self.sweep, self.points.columns["seed"][i : i + 1]).all():
             raise BadInput(f"{self.path}: the series of point {i} is not kept")
-        return read_series(self.files, i)
 
     # Reduction
 

@@ -179,9 +179,19 @@
   }
 
   function choose(row) {
+    open(row, row === null ? [] : data.points.row.flatMap((r, i) => r === row ? [i] : []));
+  }
+
+  // The cell that the page opens with: a chimera's where there is one with a picture.
+  function first() {
+    const rows = [...Array(n).keys()], pictured = rows.filter((row) => data.plates[row]?.image);
+    const chimera = pictured.find((row) => cut().looks[cut().modal[row]]?.name.startsWith("chimera"));
+    return chimera ?? pictured[0] ?? rows.find((row) => cells.results[row]) ?? null;
+  }
+
+  function open(row, points = []) {
     state.row = row;
-    const chosen = row === null ? [] : data.points.row.flatMap((r, i) => r === row ? [i] : []);
-    select(row === null ? [] : [row], chosen);
+    select(row === null ? [] : [row], points);
     $("cell").value = row === null ? "" : String(row);
     showSlice(row);
     describe();
@@ -230,20 +240,19 @@
     $("has-picture").hidden = !plate.image;
     $("has-profiles").hidden = !plate.amplitude;
     if (plate.image) {
-      const [from, to] = plate.t, range = model("picture").x_range;
-      source("picture").data = { url: [plate.image], x: [from], y: [0.5], w: [to - from], h: [data.n_nodes] };
-      range.setv({ start: from, end: to, reset_start: from, reset_end: to });
+      const [from, to] = plate.t, [first, end] = plate.nodes;
+      source("picture").data = { url: [plate.image], x: [from], y: [first - 0.5], w: [to - from], h: [end - first] };
+      fit(model("picture").x_range, from, to);
+      fit(model("picture").y_range, first - 0.5, end - 0.5);
+      $("part").textContent = plate.part;
       $("low").textContent = `u = −${plate.largest}`;
       $("high").textContent = `${plate.largest}`;
     }
     if (plate.amplitude) {
-      const columns = { node: plate.amplitude.map((_, i) => i + 1) };
+      const columns = { node: plate.node };
       for (const name of ["amplitude", "phase", "frequency"]) {
-        const spread = plate[`${name}_std`].map((s) => s ?? 0);
-        columns[name] = plate[name];
-        columns[`${name}_low`] = plate[name].map((v, i) => v - spread[i]);
-        columns[`${name}_high`] = plate[name].map((v, i) => v + spread[i]);
-        setRange(model(name).y_range, Math.min(...columns[`${name}_low`]), Math.max(...columns[`${name}_high`]));
+        for (const end of ["", "_low", "_high"]) columns[name + end] = plate[name + end];
+        setRange(model(name).y_range, Math.min(...plate[`${name}_low`]), Math.max(...plate[`${name}_high`]));
       }
       source("profile").data = columns;
     }
@@ -252,7 +261,10 @@
   function setRange(range, low, high) {
     // Profiles that are the same at all nodes are to look flat, whatever their last digits.
     const margin = Math.max(0.06 * (high - low), 0.005 * Math.max(Math.abs(low), Math.abs(high)), 1e-9);
-    const [start, end] = [low - margin, high + margin];
+    fit(range, low - margin, high + margin);
+  }
+
+  function fit(range, start, end) {
     range.setv({ start, end, reset_start: start, reset_end: end });
   }
 
@@ -340,6 +352,7 @@
     model("map").properties.inner_width.change.connect(drawMap);
     setCut(state.cut);
     applySlice();
+    open(first());
     document.documentElement.dataset.ready = "yes";
   }
 
