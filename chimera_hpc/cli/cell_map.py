@@ -160,20 +160,18 @@ def _append(text: Text, mark: Mark, plain: bool, width: int = 1) -> None:
 
 
 def _strip(text: Text, axis: FreeAxis, marks: Sequence[Mark], width: int, plain: bool) -> None:
-    """Append cells along one axis in as many lines as they need, each with its first value."""
+    """Append cells along one axis in as many lines as they need, each over its values."""
     order = np.argsort(axis.values, kind="stable").tolist()
-    heads = [axis.label(axis.values[i]) for i in order]
-    margin = max(map(len, heads)) + 1
-    across = 2 if 2 * len(order) + margin <= width else 1
-    length = max(1, (width - margin) // across)
+    labels = [axis.label(axis.values[i]) for i in order]
+    size = next((k for k in (3, 2, 1) if k * len(order) <= width), 1)
+    length = max(1, width // size)
     if length < len(order) and length >= 20:
         length -= length % 10
     text.append(f"{axis.plain}\n", style="bold")
     for start in range(0, len(order), length):
-        text.append(heads[start].rjust(margin - 1) + " ")
         for i in order[start : start + length]:
-            _append(text, marks[i], plain, across)
-        text.append("\n")
+            _append(text, marks[i], plain, size)
+        text.append("\n" + _heads(labels[start : start + length], size, width) + "\n")
 
 
 def _maps(

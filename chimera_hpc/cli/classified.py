@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,16 +13,11 @@ import numpy as np
 from chimera_hpc.cli.arguments import errors_in_one_line
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from chimera_hpc.job.tables import Features
     from chimera_hpc.recordings.judge import Judge, Measured
     from chimera_hpc.recordings.prepare import Prepared
 
-_CLOSE_UP = 12.0
 _MOST_GAPS = 5
-_LABELS = 12
-"""Most names along an axis."""
 
 
 def lines(
@@ -135,54 +130,32 @@ def draw(
     args: Namespace, made: Prepared, found: Measured, settings: Features, judge: Judge | None
 ) -> list[Path]:
     """Draw the recording, its profiles, a spectrum, and its place in the atlas."""
-    from chimera_hpc.plot.indicators import fourier_indicators, profiles_of
+    from chimera_hpc.plot.indicators import fourier_indicators, profiles_of, variations_text
     from chimera_hpc.plot.judged import judged
     from chimera_hpc.plot.spacetime import space_time
     from chimera_hpc.plot.spectrum import spectrum
-    from chimera_hpc.plot.style import save
+    from chimera_hpc.plot.style import plain, save
     from chimera_hpc.recordings.gaps import called
     from chimera_hpc.reduction.replay import window_spectrum
 
     words = [args.file.name, (found.name or "").replace("_", " ")]
-    title = _plain("\n".join(filter(None, words)))
-    length = float(made.t[-1] - made.t[0])
-    zoom = None
+    title, names = plain("\n".join(filter(None, words))), made.names
+    figures = {"space_time": space_time([(made.t, made.u.T)], [title], names=names)}
     if found.features.n_windows:
-        zoom = _CLOSE_UP / float(np.median(found.features.frequency))
-    zoom = zoom if zoom is not None and zoom < 0.5 * length else None
-    figures = {"space_time": space_time([(made.t, made.u)], [title], zoom=zoom)}
-    if found.features.n_windows:
-        figures["profiles"] = fourier_indicators([profiles_of(found.features.as_array())], [title])
+        title = f"{title}\n{variations_text(found.triplet)}"
+        profiles = [profiles_of(found.features.as_array())]
+        figures["profiles"] = fourier_indicators(profiles, [title], names)
         node = settings.reference_node
         data, _ = window_spectrum(made.t, made.u, settings, node, 0)
-        figures["spectrum"] = spectrum(data, _plain(f"{called(made.names[node])}, window 1"))
+        figures["spectrum"] = spectrum(data, plain(f"{called(names[node])}, window 0"))
     if judge is not None and found.verdict is not None:
         low, high = judge.atlas.scaler
         triplets = low + judge.atlas.points * (high - low)
         figures["atlas"] = judged(
             triplets, judge.atlas.labels, judge.atlas.names, found.triplet, found.verdict.name
         )
-    _name_nodes(figures, made.names)
     folder = args.out or Path(f"{args.file.name}-classified")
     # The warnings are of letters that the font lacks.
     with errors_in_one_line(folder), warnings.catch_warnings(action="ignore"):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / name)[0] for name, figure in figures.items()]
-
-
-def _plain(text: str) -> str:
-    """Keep dollars from beginning a formula."""
-    return text.replace("$", r"\$")
-
-
-def _name_nodes(figures: dict[str, Figure], names: Sequence[str]) -> None:
-    """Write the names of the nodes, or their numbers from 0, along the axes of nodes."""
-    ticks = np.unique(np.linspace(0, len(names) - 1, min(_LABELS, len(names))).astype(int))
-    labels = [_plain(names[i]) for i in ticks]
-    for axes in figures["space_time"].axes:
-        if axes.get_images():
-            axes.set_yticks(ticks + 1, labels)
-    profiles = figures.get("profiles")
-    for axes in profiles.axes if profiles is not None else ():
-        long = max(map(len, labels)) > 2
-        axes.set_xticks(ticks + 1, labels, rotation=90 if long else 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,13 +35,11 @@ EPILOG = """examples:
 The run is integrated again by the code that made the sweep, and what comes out is compared with the
 store bit for bit; exit status 1: it comes out otherwise. Values that select one cell and no seed
 show its seeds side by side, and the portrait and spectrum of the one that stands for them: of the
-most frequent class, nearest to the median of its variations. Nodes and windows count from 0 here,
-as features.reference_node does, and from 1 in figures.
+most frequent class, nearest to the median of its variations. Nodes and windows count from 0, here
+and in figures.
 """
 _SIDE_BY_SIDE = 6
 """Most seeds of a cell that are drawn."""
-_CLOSE_UP = 12.0
-"""Periods in the close-up of the space-time plot."""
 _FRAMES_A_PERIOD = 25
 
 
@@ -151,7 +149,7 @@ def _draw(
     store: Store, runs: list[Replay], focus: Replay, node: int, window: int, folder: Path, stem: str
 ) -> list[Path]:
     """Draw all that there is to draw; returns the PNG files, each with a PDF next to it."""
-    from chimera_hpc.plot.indicators import fourier_indicators, profiles_of
+    from chimera_hpc.plot.indicators import fourier_indicators, profiles_of, variations_text
     from chimera_hpc.plot.portrait import ring_portrait
     from chimera_hpc.plot.spacetime import space_time
     from chimera_hpc.plot.spectrum import spectrum
@@ -164,14 +162,11 @@ def _draw(
     at_node = "" if node == store.sweep.features.reference_node else f"-node{node}"
     seen = [run for run in runs if np.isfinite(run.u).any()]
     if seen:
-        length = seen[0].t[-1] - seen[0].t[0]
-        slowest = np.nanmax([run.period for run in seen] + [0.0])
-        zoom = _CLOSE_UP * slowest if 0.0 < _CLOSE_UP * slowest < 0.5 * length else None
-        panels: list[Any] = [(run.t, run.u) for run in seen]
-        figures["space_time"] = space_time(panels, [run.title for run in seen], zoom=zoom)
+        panels = [(run.t, run.u.T) for run in seen]
+        figures["space_time"] = space_time(panels, [run.title for run in seen])
     measured = [run for run in runs if run.n_windows]
     if measured:
-        titles = [f"{run.title}\n$V$ = ({_three(run.triplet)})" for run in measured]
+        titles = [f"{run.title}\n{variations_text(run.triplet)}" for run in measured]
         figures["profiles"] = fourier_indicators(
             [profiles_of(run.features) for run in measured], titles
         )
@@ -187,15 +182,11 @@ def _draw(
         data, text = window_spectrum(focus.t, focus.u, settings, node, window)
         print(text)
         figures[f"spectrum{at_node}{at_window}"] = spectrum(
-            data, f"node {node + 1}, window {window + 1}"
+            data, f"node {node}, window {window}"
         )
     with errors_in_one_line(folder):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]
-
-
-def _three(triplet: Any) -> str:
-    return ", ".join(f"{value:.3f}" for value in triplet)
 
 
 def _animate(store: Store, run: Replay, path: Path, periods: float) -> None:

@@ -68,7 +68,7 @@ def _draw_matrix(axes: Axes, comparison: Comparison) -> None:
     for (row, column), count in np.ndenumerate(counts):
         shade = "white" if share[row, column] > 0.5 else "black"
         axes.text(column, row, str(count), ha="center", va="center", color=shade)
-    names = [style.spoken(name) for name in comparison.classes]
+    names = [style.drawn(name) for name in comparison.classes]
     axes.set_xticks(range(len(names)), names, rotation=20.0, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(len(names)), names)
     axes.set_xlabel(comparison.columns)

@@ -45,7 +45,7 @@ def animate_ring(
 ) -> None:
     """Write one frame for each sample of u and w, both (T, N), at the times t (T,).
 
-    On the ring, node 1 is on the right and the others follow counter-clockwise; u moves a node
+    On the ring, node 0 is on the right and the others follow counter-clockwise; u moves a node
     outwards and gives its colour, which it keeps in the plane (u, w).
 
     Raises BadInput: as `check_film`.

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from chimera_hpc.plot import style
 from chimera_hpc.plot.dendrogram import draw_dendrogram
 from chimera_hpc.plot.figure_input import FigureInput
-from chimera_hpc.plot.modes import draw_modal_classes
+from chimera_hpc.plot.modes import draw_modal_classes, vote_handles
 from chimera_hpc.plot.projections import draw_projection
 
 
@@ -27,5 +27,6 @@ def classification_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     draw_projection(axes[1], data.triplets, cut.labels, cut.names)
     style.letter(axes)
     draw_modal_classes(axes[2], data.axes, classes, data.votes(n_clusters))
-    style.add_class_legend(figure, [*cut.names, *filter(None, classes)])
+    discs = vote_handles() if len(data.axes) == 1 else []
+    style.add_class_legend(figure, [*cut.names, *filter(None, classes)], discs)
     return figure

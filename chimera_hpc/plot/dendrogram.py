@@ -56,7 +56,7 @@ def draw_dendrogram(
         colour = style.colour_of(names[label]) if label >= 0 else _STEM
         lines = LineCollection(list(chosen), colors=colour, linewidths=0.7, capstyle="butt")
         lines.set_rasterized(len(chosen) > 2000)
-        lines.set_label(names[label] if label >= 0 else "above the cut")
+        lines.set_label(style.drawn(names[label]) if label >= 0 else "above the cut")
         axes.add_collection(lines)
     axes.axhline(depth, color="black", linewidth=0.9, linestyle="--", label="cut")
     top = max(float(linkage[:, 2].max(initial=0.0)), depth, 1e-12)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.classify.classification import Classification
 from chimera_hpc.plot.raster import NodeSeries
+from chimera_hpc.plot.style import drawn
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ class DrawnRun:
     @property
     def title(self) -> str:
         """Place and class, a line each."""
-        return "\n".join(filter(None, [self.place, self.class_name]))
+        return "\n".join(filter(None, [self.place, drawn(self.class_name)]))
 
 
 @dataclass(frozen=True)

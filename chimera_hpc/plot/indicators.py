@@ -31,12 +31,9 @@ def _variations(run: DrawnRun) -> str:
 
 
 def variations_text(triplet: ArrayLike) -> str:
-    """Return the three variations with their symbols, on two lines."""
-    values = np.asarray(triplet, dtype=np.float64)
-    phase, amplitude, frequency = (
-        f"${symbol}$ = {value:.3f}" for symbol, value in zip(SYMBOLS, values, strict=True)
-    )
-    return f"{phase}, {amplitude},\n{frequency}"
+    """Return the three variations under their symbols."""
+    values = ", ".join(f"{value:.3f}" for value in np.asarray(triplet, dtype=np.float64))
+    return f"$({', '.join(SYMBOLS)})$ =\n({values})"
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def judged(
         draw_projection(axes, triplets, labels, names, plane, alpha=0.45)
         x, y = plane
         axes.plot(mine[x], mine[y], linestyle="none", markersize=13.0, zorder=4.0, **look)
-    label = f"the recording: {called}"
+    label = f"the recording: {style.drawn(called)}"
     star = Line2D([], [], linestyle="none", markersize=11.0, label=label, **look)
     style.add_class_legend(figure, names, [star])
     style.letter(panels)

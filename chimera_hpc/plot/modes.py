@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
 from chimera_hpc.plot.audit import add_kept_panel, open_loose_cells
 from chimera_hpc.plot.figure_input import FigureInput
+
+Array = NDArray[np.float64]
+
+_WHOLE = 90.0
+"""Area of the disc of all votes, in points squared."""
+_SHARES = (0.1, 0.5, 1.0)
 
 Classes = Sequence[str | None]
 Votes = Sequence[Mapping[str, int]]
@@ -42,7 +51,9 @@ def modal_classes(
     if len(parameters) == 2:
         loose = [] if kept is None else open_loose_cells(axes, parameters, classes, kept)
         style.add_class_legend(figure, filter(None, classes), loose)
-    elif kept is not None:
+        return figure
+    style.add_legend(figure, vote_handles())
+    if kept is not None:
         add_kept_panel(figure, axes, parameters[0][1], classes, kept)
     return figure
 
@@ -71,7 +82,7 @@ def _draw_against(axes: Axes, label: str, x: ArrayLike, classes: Classes, votes:
             axes.scatter(
                 values[i],
                 rows.index(name),
-                s=90.0 * count / total,
+                s=_WHOLE * count / total,
                 color=style.lighten(style.colour_of(name), 0.72),
                 linewidths=0.0,
                 zorder=1.0,
@@ -79,23 +90,52 @@ def _draw_against(axes: Axes, label: str, x: ArrayLike, classes: Classes, votes:
     for row, name in enumerate(rows):
         chosen = values[[other == name for other in classes]]
         style.scatter_class(axes, chosen, np.full(len(chosen), row), name, 20.0, zorder=2.0)
-    axes.set_yticks(range(len(rows)), [style.spoken(name) for name in rows])
+    axes.set_yticks(range(len(rows)), [style.drawn(name) for name in rows])
     axes.set_ylim(-0.6, len(rows) - 0.4)
     style.set_ticks(axes.xaxis, values, nbins=9, steps=[1, 2, 3, 5, 10])
     axes.set_xlabel(label)
     axes.grid(axis="y", color="#eeeeee")
 
 
+def vote_handles() -> list[Line2D]:
+    """Return what a legend says of the sizes of discs."""
+    look: dict[str, Any] = {"ls": "none", "marker": "o", "color": "#cccccc", "markeredgewidth": 0.0}
+    return [
+        Line2D([], [], markersize=(_WHOLE * share) ** 0.5, label=f"{share:.0%} of votes", **look)
+        for share in _SHARES
+    ]
+
+
 def _draw_map(axes: Axes, parameters: Parameters, classes: Classes) -> None:
-    """Put one marker for each cell (x, y), coloured and shaped by its class."""
+    """Fill the cell of each (x, y) with the colour of its class, and put the class's marker there.
+
+    Steps of a parameter need not be equal: a cell reaches half-way to the next value.
+    """
     (x_label, x), (y_label, y) = ((label, np.asarray(v, float)) for label, v in parameters)
-    for name in style.in_order(filter(None, classes)):
+    (across, x_edges), (up, y_edges) = _grid(x), _grid(y)
+    names = style.in_order(filter(None, classes))
+    shade = np.full((len(y_edges) - 1, len(x_edges) - 1), np.nan)
+    for i, name in enumerate(names):
         chosen = np.array([other == name for other in classes])
-        style.scatter_class(axes, x[chosen], y[chosen], name, 16.0)
+        shade[up[chosen], across[chosen]] = i
+    pale = ListedColormap([style.lighten(style.colour_of(name), 0.55) for name in names])
+    axes.pcolormesh(x_edges, y_edges, shade, cmap=pale, vmin=-0.5, vmax=len(names) - 0.5)
+    size = min(16.0, (160.0 / max(shade.shape)) ** 2)
+    for name in names:
+        chosen = np.array([other == name for other in classes])
+        style.scatter_class(axes, x[chosen], y[chosen], name, size)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     style.set_ticks(axes.xaxis, x)
     style.set_ticks(axes.yaxis, y)
+
+
+def _grid(values: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return for each cell its place along an axis, and the edges between places."""
+    centres, place = np.unique(values, return_inverse=True)
+    between = 0.5 * (centres[1:] + centres[:-1])
+    ends = 2.0 * centres[[0, -1]] - between[[0, -1]]
+    return place, np.concatenate([ends[:1], between, ends[1:]])
 
 
 def _rows(names: list[str]) -> list[str]:

@@ -41,7 +41,7 @@ def networks(panels: Sequence[tuple[str, ArrayLike]], reference: ArrayLike, n_no
 
 
 def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: int) -> None:
-    """Draw node 1 at the top, the others clockwise, each link as a chord with an arrow."""
+    """Draw node 0 at the top, the others clockwise, each link as a chord with an arrow."""
     ends, usual = np.asarray(links, dtype=np.int64), np.asarray(reference, dtype=np.int64)
     places = node_places(n_nodes)
     turned = np.any(ends != usual, axis=1)
@@ -64,7 +64,7 @@ def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: in
     )
     for i in range(n_nodes if numbered else 0):
         look: dict[str, Any] = {"ha": "center", "va": "center", "fontweight": "bold"}
-        axes.text(places[i, 0], places[i, 1] - 0.01, str(i + 1), color="white", zorder=4.0, **look)
+        axes.text(places[i, 0], places[i, 1] - 0.01, str(i), color="white", zorder=4.0, **look)
     axes.set_xlim(-1.18, 1.18)
     axes.set_ylim(-1.18, 1.18)
     axes.set_aspect("equal")
@@ -72,7 +72,7 @@ def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: in
 
 
 def node_places(n_nodes: int) -> NDArray[np.float64]:
-    """Return the places (n_nodes, 2) on the unit circle, node 1 at the top, then clockwise."""
+    """Return the places (n_nodes, 2) on the unit circle, node 0 at the top, then clockwise."""
     angle = 0.5 * np.pi - 2.0 * np.pi * np.arange(n_nodes) / n_nodes
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 

@@ -24,6 +24,8 @@ _MOST_STRIDE = 8
 _SOME_NODES = 64
 _FLAT = 1e-3
 """Range of a node, in units of the largest value, below which it does not oscillate."""
+_JUMPS = 0.4
+"""Share of dots with jumps up to which a picture can be read: five dots a period."""
 _PIECE = 2_000_000
 """Samples that are looked at in one go."""
 _GROUPS = 24
@@ -74,7 +76,7 @@ def n_periods(u: NodeSeries) -> tuple[float, float]:
 
     A tenth of the nodes that oscillate are slower, and a quarter faster; 0 where none oscillates.
     """
-    rows = u[:: max(1, -(-u.shape[0] // _SOME_NODES))]
+    rows = _some(u)
     low, high = np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
     above = rows > 0.5 * (low + high)[:, None]
     crossings = np.count_nonzero(above[:, 1:] != above[:, :-1], axis=1)
@@ -84,17 +86,17 @@ def n_periods(u: NodeSeries) -> tuple[float, float]:
     return float(slow), float(fast)
 
 
-def overview(t: ArrayLike, u: NodeSeries, most_periods: float) -> Raster:
+def overview(t: ArrayLike, u: NodeSeries, dots: int = COLUMNS) -> Raster:
     """Return u over all times and nodes, or its range in each period where that is readable only.
 
-    That is where there are more periods than `most_periods`, or where neighbours differ in all of a
-    ring of more nodes than a picture has rows.
+    That is where u jumps within many of the `dots` along time, or where neighbours differ in all of
+    a ring of more nodes than a picture has rows.
     """
-    time, (slow, fast) = np.asarray(t, dtype=np.float64), n_periods(u)
+    time, slow = np.asarray(t, dtype=np.float64), n_periods(u)[0]
     stride = -(-u.shape[0] // ROWS)
-    if fast <= most_periods and (stride == 1 or slow < 1.0 or _is_smooth(u, stride)):
+    if slow < 1.0 or (_is_slow(u, dots) and (stride == 1 or _is_smooth(u, stride))):
         return stretch(time, u, float(time[-1] - time[0]), stride=stride)
-    low, high = envelope(u, ROWS, min(COLUMNS, max(1, int(slow))))
+    low, high = envelope(u, ROWS, min(COLUMNS, int(slow)))
     return Raster(high - low, _edges(time), (0, u.shape[0]), is_range=True)
 
 
@@ -155,9 +157,7 @@ def bins(n: int, parts: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, n, min(parts, n) + 1).astype(np.int64)[:-1])
 
 
-def _pieces(
-    starts: NDArray[np.int64], n_nodes: int, n_times: int
-) -> Iterator[tuple[slice, slice]]:
+def _pieces(starts: NDArray[np.int64], n_nodes: int, n_times: int) -> Iterator[tuple[slice, slice]]:
     """Yield some rows of the picture with their nodes, few enough samples at a time."""
     ends = np.append(starts[1:], n_nodes)
     at_once = max(1, _PIECE // max(1, n_times * int((ends - starts).max())))
@@ -169,6 +169,22 @@ def _pieces(
 def _edges(time: Array) -> tuple[float, float]:
     half = 0.5 * float(time[1] - time[0]) if len(time) > 1 else 0.5
     return float(time[0]) - half, float(time[-1]) + half
+
+
+def _some(u: NodeSeries) -> Array:
+    return u[:: max(1, -(-u.shape[0] // _SOME_NODES))]
+
+
+def _is_slow(u: NodeSeries, dots: int) -> bool:
+    """Whether u goes through half of its range in few of so many dots along time."""
+    rows = _some(u)
+    low, high = envelope(rows, len(rows), dots)
+    following = rows[:, bins(rows.shape[1], dots)[1:]]
+    low[:, :-1] = np.fmin(low[:, :-1], following)
+    high[:, :-1] = np.fmax(high[:, :-1], following)
+    whole = high.max(axis=1, keepdims=True) - low.min(axis=1, keepdims=True)
+    moving = whole[:, 0] > _FLAT * np.nanmax(np.abs(rows))
+    return bool(np.mean((high - low > 0.5 * whole)[moving]) <= _JUMPS)
 
 
 def _is_smooth(u: NodeSeries, stride: int) -> bool:

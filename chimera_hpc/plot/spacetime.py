@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,8 +19,8 @@ from chimera_hpc.plot.raster import NodeSeries, Raster, close_up, overview
 Panel = tuple[ArrayLike, NodeSeries]
 """Times (T,), uniform, and u (N, T)."""
 
-_MOST_PERIODS = 72
-"""Periods that can be told apart over the width of a page."""
+_DOTS = 1000
+"""Dots over the width of a page."""
 
 
 def space_time_figure(data: FigureInput) -> Figure | None:
@@ -52,7 +53,7 @@ def space_time(
     stand along their axis, by default their numbers from 0.
     """
     columns = 2 if len(panels) == 4 and columns > 2 else min(columns, len(panels))
-    upper = [overview(t, u, _MOST_PERIODS / columns) for t, u in panels]
+    upper = [overview(t, u, _DOTS // columns) for t, u in panels]
     coarse = any(raster.is_range or raster.partly for raster in upper)
     lower = [close_up(t, u) for t, u in panels] if coarse else []
     rows, parts = -(-len(panels) // columns), 2 if coarse else 1
@@ -110,7 +111,7 @@ def _largest(rasters: Iterable[Raster], is_range: bool) -> float:
     return max((float(np.nanmax(np.abs(v), initial=0.0)) for v in values), default=0.0) or 1.0
 
 
-def _add_bars(figure: Figure, axes: NDArray[np.object_], symbol: str, apart: bool) -> None:
+def _add_bars(figure: Figure, axes: NDArray[Any], symbol: str, apart: bool) -> None:
     """Put a bar of colours for u, and one for its range, next to all panels or to their own row."""
     labels = {"viridis": f"${symbol}$", "magma": f"range of ${symbol}$ in a period"}
     images = [frame.images[0] for frame in axes.flat if frame.images]

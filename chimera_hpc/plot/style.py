@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -20,6 +21,7 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
@@ -64,6 +66,8 @@ SETTINGS: Any = {
 }
 
 _MOST_NAMES = 12
+_TRIES = 4
+"""Times that ticks are thinned out."""
 
 Arguments = ParamSpec("Arguments")
 Made = TypeVar("Made")
@@ -97,7 +101,7 @@ def scatter_class(
     axes: Axes, x: ArrayLike, y: ArrayLike, name: str, size: float, **look: Any
 ) -> None:
     """Put the marker of a class, in its colour, at each (x, y); `look` overrides both."""
-    plain = {"marker": marker_of(name), "color": colour_of(name), "label": spoken(name)}
+    plain = {"marker": marker_of(name), "color": colour_of(name), "label": drawn(name)}
     axes.scatter(x, y, s=size, linewidths=0.0, **{**plain, **look})
 
 
@@ -139,14 +143,43 @@ def plain(text: str) -> str:
 def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
     """Write the figure as PNG (200 dots per inch) and PDF; return both paths.
 
-    Equal figures give equal bytes: no date is written.
+    Equal figures give equal bytes: no date is written. Ticks are left out where labels overlap.
     """
     stem = Path(path_without_suffix)
     png, pdf = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".pdf")
     with mpl.rc_context(SETTINGS):
         figure.savefig(png, dpi=200)
+        for _ in range(_TRIES):
+            if not thin_ticks(figure):
+                break
+            figure.savefig(png, dpi=200)
         figure.savefig(pdf, dpi=200, metadata={"CreationDate": None})
     return png, pdf
+
+
+def thin_ticks(figure: Figure) -> bool:
+    """Leave out every other tick of axes whose labels overlap; say whether there were any.
+
+    The figure has been drawn before.
+    """
+    flat = [axes for axes in figure.axes if axes.name != "3d"]
+    crowded = [axis for axes in flat for axis in (axes.xaxis, axes.yaxis) if _overlaps(axis)]
+    for axis in crowded:
+        seen = _seen_labels(axis)[::2]
+        axis.set_ticks([x for x, _ in seen], [label.get_text() for _, label in seen])
+    return bool(crowded)
+
+
+def _seen_labels(axis: Axis) -> list[tuple[float, Text]]:
+    """Return place and label of each tick that is seen."""
+    low, high = sorted(axis.get_view_interval())
+    labels = zip(axis.get_majorticklocs().tolist(), axis.get_majorticklabels(), strict=False)
+    return [(x, label) for x, label in labels if low <= x <= high and label.get_text()]
+
+
+def _overlaps(axis: Axis) -> bool:
+    boxes = [label.get_window_extent() for _, label in _seen_labels(axis)]
+    return any(one.overlaps(other) for one, other in pairwise(boxes))
 
 
 def family_and_number(name: str) -> tuple[str, int]:
@@ -200,6 +233,11 @@ def spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
+def drawn(name: str) -> str:
+    """Return a class name as figures have it."""
+    return plain(spoken(name))
+
+
 def class_handles(names: Iterable[str], size: float = 5.0) -> list[Line2D]:
     """Return one legend entry per class, in the fixed order."""
     return [
@@ -210,7 +248,7 @@ def class_handles(names: Iterable[str], size: float = 5.0) -> list[Line2D]:
             marker=marker_of(name),
             color=colour_of(name),
             markersize=size,
-            label=spoken(name),
+            label=drawn(name),
         )
         for name in in_order(names)
     ]
@@ -218,7 +256,11 @@ def class_handles(names: Iterable[str], size: float = 5.0) -> list[Line2D]:
 
 def add_class_legend(figure: Figure, names: Iterable[str], extra: Iterable[Line2D] = ()) -> None:
     """Put a legend of classes above all panels, in as many rows as the width asks for."""
-    handles = [*class_handles(names), *extra]
+    add_legend(figure, [*class_handles(names), *extra])
+
+
+def add_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """Put a legend above all panels, in as many rows as the width asks for."""
     columns = max(1, min(len(handles), int(figure.get_figwidth() / 1.15)))
     figure.legend(handles=handles, loc="outside upper center", ncols=columns)
 

@@ -37,7 +37,8 @@ def signal_figure(data: FigureInput) -> Figure | None:
     if entry is None:
         return None
     signal = entry["signal"]
-    return space_time([(signal["t"], np.asarray(signal["u"], float).T)], ["synthetic signal"], symbol="x_j(t)")
+    u = np.asarray(signal["u"], dtype=np.float64)
+    return space_time([(signal["t"], u.T)], ["synthetic signal"], symbol="x_j(t)")
 
 
 @style.styled

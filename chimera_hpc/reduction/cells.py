@@ -97,5 +97,5 @@ def _count(columns: Sequence[NDArray[Any]]) -> int:
 
 
 def _symbol(name: str) -> str:
-    plain = rf"\mathrm{{{name}}}" if len(name) > 1 else name
-    return SYMBOLS.get(name, plain)
+    text = name.replace("_", r"\_")
+    return SYMBOLS.get(name, rf"\mathrm{{{text}}}" if len(name) > 1 else text)

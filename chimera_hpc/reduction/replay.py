@@ -15,6 +15,7 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.fourier import window_lines
 from chimera_hpc.plot.spectrum import Spectrum
+from chimera_hpc.plot.style import drawn
 from chimera_hpc.reduction.cells import describe, free_axes
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.ledger import digests
@@ -176,7 +177,7 @@ def _title(store: Store, i: int, name: str | None) -> str:
     row = store.points.row(i)
     free = free_axes(store.points.cells()[1], axes)
     place = ", ".join(filter(None, [describe(row, free, math=True), f"seed {row['seed']}"]))
-    return "\n".join(filter(None, [place, name and name.replace("_", " ")]))
+    return "\n".join(filter(None, [place, drawn(name or "")]))
 
 
 def has_nullcline(sweep: Sweep) -> bool:

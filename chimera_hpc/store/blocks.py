@@ -117,7 +117,7 @@ class BlockFiles:
         return Damage(block, name, reason) if reason else None
 
     def place_of_series(self, block: int, row: int) -> tuple[int, int] | None:
-        """Return offset and bytes of the series of a point in its block's file; None without one."""
+        """Return where the series of a point is: offset and bytes; None where it is not kept."""
         with self.file("u", block).open("rb") as file:
             file.seek(-self._index_size(), 2)
             index = np.frombuffer(file.read(), "<u8", count=2 * self.shapes["u"][0]).reshape(-1, 2)

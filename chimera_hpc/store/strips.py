@@ -58,8 +58,9 @@ class StoredSeries:
         """Return u of these nodes, (nodes, T); NaN where a sample is missing."""
         first, last, step = nodes.indices(self.shape[0])
         pieces = [(first, last)] if step == 1 else [(i, i + 1) for i in range(first, last, step)]
-        if not pieces or self._buffer is None:
-            return np.full((len(range(first, last, step)), self.shape[1]), np.nan)
+        count = len(range(first, last, step))
+        if not count or self._buffer is None:
+            return np.full((count, self.shape[1]), np.nan)
         with self._path.open("rb") as file:
             return np.concatenate([self._read(file, *piece) for piece in pieces])
 

@@ -45,4 +45,4 @@ def test_markers_of_cells_below_the_level_are_open(rendered: Render) -> None:
 
 def test_without_an_audit_there_is_neither() -> None:
     assert len(modal_classes(LINE, CLASSES).axes) == 1
-    assert len(modal_classes(PLANE, CLASSES).axes[0].collections) == 3
+    assert len(modal_classes(PLANE, CLASSES).axes[0].collections) == 4  # cells, and three classes

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_hex
 
 from chimera_hpc.base.status import Status
@@ -17,7 +18,7 @@ from chimera_hpc.plot.classification import classification_figure
 from chimera_hpc.plot.dendrogram import dendrogram_figure
 from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
 from chimera_hpc.plot.indicators import indicators_figure
-from chimera_hpc.plot.modes import modal_classes_figure
+from chimera_hpc.plot.modes import modal_classes, modal_classes_figure
 from chimera_hpc.plot.projections import projections_figure
 from chimera_hpc.plot.spacetime import space_time_figure, whole_run_figure
 from chimera_hpc.plot.style import BLACK, BLUE, RED
@@ -28,7 +29,7 @@ T = np.arange(0.0, 20.0, 0.02)
 
 
 def run(place="$P = Q = 12$, seed 0", frequency=4.0, **changes):
-    u = np.sin(2.0 * np.pi * frequency * T[:, None] + np.arange(8))
+    u = np.sin(2.0 * np.pi * frequency * T + np.arange(8)[:, None])
     features = np.full((8, 8), 0.1)
     features[1] = frequency
     made = DrawnRun(place, T, u, "disordered", features, np.array([0.575, 0.018, 0.012]))
@@ -91,11 +92,11 @@ def test_files_of_others_are_not_taken_for_own(name):
 
 
 def test_space_time_shows_each_run_over_a_close_up_of_twelve_periods():
-    drawn = space_time_figure(outcome(shown=[run("one"), run("two", 2.0)]))
+    drawn = space_time_figure(outcome(shown=[run("one", 8.0), run("two", 5.0)]))
     images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
     assert len(images) == 4
     starts = [round(float(image.get_extent()[0]), 1) for image in images]
-    assert starts == [0.0, 0.0, 17.0, 14.0]  # periods of 0.25 and 0.5
+    assert starts == [0.0, 0.0, 18.5, 17.6]  # periods of 0.125 and 0.2
 
 
 @pytest.mark.parametrize("draw", [space_time_figure, indicators_figure])
@@ -104,7 +105,7 @@ def test_titles_of_neighbours_stay_apart(draw):
     drawn.draw_without_rendering()
     titles = [text for axes in drawn.axes if (text := axes._left_title).get_text()]
     boxes = [text.get_window_extent() for text in titles]
-    assert len(boxes) == 3
+    assert len(boxes) == (6 if draw is space_time_figure else 3)  # with those of close-ups
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
     assert max(box.x1 for box in boxes) <= drawn.bbox.x1
     assert titles[2].get_text().startswith("(c)  $P = Q = 21$")
@@ -129,16 +130,18 @@ def test_indicators_tell_the_variations_and_leave_out_still_runs():
     still = run(features=None, triplet=None)
     drawn = indicators_figure(outcome(shown=[still, run()]))
     assert len(drawn.axes) == 3
-    assert drawn.axes[0].get_title().endswith("$V$ = (0.575, 0.018, 0.012)")
+    assert (
+        drawn.axes[0].get_title().endswith("$(V_\\theta, V_a, V_\\Omega)$ =\n(0.575, 0.018, 0.012)")
+    )
     (dots,) = drawn.axes[2].lines
     np.testing.assert_array_equal(dots.get_ydata(), np.full(8, 4.0))
 
 
 def test_slow_run_beside_a_fast_one_is_drawn_over_half_of_its_series():
-    drawn = space_time_figure(outcome(shown=[run("one"), run("slow", 0.1)]))
+    drawn = space_time_figure(outcome(shown=[run("one", 8.0), run("slow", 0.1)]))
     images = [axes.get_images()[0] for axes in drawn.axes if axes.get_images()]
     starts = [round(float(image.get_extent()[0]), 1) for image in images]
-    assert starts == [0.0, 0.0, 17.0, 10.0]
+    assert starts == [0.0, 0.0, 18.5, 10.0]
 
 
 def test_still_run_has_no_close_up():
@@ -160,7 +163,27 @@ def test_modal_classes_go_against_one_axis_or_over_two():
     assert [tick.get_text() for tick in line.get_yticklabels()] == list(NAMES)
     plane = modal_classes_figure(outcome(2), 3).axes[0]
     assert (plane.get_xlabel(), plane.get_ylabel()) == ("$P = Q$", "$b$")
-    assert colours_of_points(plane) == {RED, BLUE, BLACK}
+    assert colours_of_points(plane) >= {RED, BLUE, BLACK}
+
+
+def test_sizes_of_votes_have_a_legend():
+    drawn = modal_classes_figure(outcome(1), 3)
+    (legend,) = drawn.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        f"{share} % of votes".replace(" %", "%") for share in (10, 50, 100)
+    ]
+    largest = max(dots.get_sizes().max() for dots in drawn.axes[0].collections)
+    assert legend.legend_handles[-1].get_markersize() ** 2 == pytest.approx(largest)
+
+
+def test_map_fills_its_axes_whatever_the_steps_of_its_parameters():
+    x = ("$P$", np.tile([1.0, 2.0, 10.0], 2))
+    y = ("$b$", np.repeat([0.1, 0.4], 3))
+    (axes,) = modal_classes((x, y), ["ordered"] * 5 + [None]).axes
+    assert axes.get_xlim() == (0.5, 14.0)
+    assert axes.get_ylim() == pytest.approx((-0.05, 0.55))
+    (cells,) = [mesh for mesh in axes.collections if isinstance(mesh, QuadMesh)]
+    assert cells.get_array().mask.tolist() == [[False] * 3, [False, False, True]]
 
 
 def test_composite_has_tree_plane_and_classes(rendered):
@@ -168,7 +191,9 @@ def test_composite_has_tree_plane_and_classes(rendered):
         drawn = rendered(classification_figure(outcome(n_axes), 3))
         tree, plane, classes = drawn.axes
         assert [axes.get_title(loc="left") for axes in drawn.axes] == ["(a)", "(b)", "(c)"]
-        assert [text.get_text() for text in drawn.legends[0].get_texts()] == list(NAMES)
+        words = [text.get_text() for text in drawn.legends[0].get_texts()]
+        assert words[:3] == list(NAMES)
+        assert len(words) == (6 if n_axes == 1 else 3)
         assert tree.get_xlabel() == "18 runs"
         assert colours_of_points(plane) == {RED, BLUE, BLACK}
         assert classes.get_ylabel() == label

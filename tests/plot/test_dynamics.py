@@ -11,22 +11,23 @@ from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
 from chimera_hpc.plot.indicators import IndicatorProfiles, fourier_indicators
-from chimera_hpc.plot.spacetime import last_part, space_time
+from chimera_hpc.plot.spacetime import space_time
 
 Render = Callable[[Figure], Figure]
 T = np.linspace(0.0, 10.0, 101)
-U = np.cos(T[:, None] + np.arange(8))
+U = np.cos(T + np.arange(8)[:, None])
+FAST = np.cos(80.0 * np.linspace(0.0, 10.0, 2001) + np.arange(8)[:, None])
 
 
 def test_space_time_shows_nodes_upwards_and_time_to_the_right(rendered: Render) -> None:
-    u = np.zeros((101, 8))
-    u[50:, 2] = 2.0  # node 3, from t = 5 on
+    u = np.zeros((8, 101))
+    u[2, 50:] = 2.0  # node 2, from t = 5 on
     figure = rendered(space_time([(T, u), (T, U)], ["one", "two"]))
     axes = figure.axes[0]
     (image,) = axes.images
     left, right, bottom, top = image.get_extent()
     assert (left, right) == pytest.approx((-0.05, 10.05))
-    assert (bottom, top) == (0.5, 8.5)
+    assert (bottom, top) == (-0.5, 7.5)
     assert image.origin == "lower"
     assert np.argwhere(image.get_array() == 2.0).min(axis=0).tolist() == [2, 50]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time $t$", "node $i$")
@@ -42,25 +43,33 @@ def test_space_time_panels_share_a_symmetric_colour_scale() -> None:
     assert figure.axes[-1].get_ylabel() == "$u_i(t)$"
 
 
-def test_space_time_zoom_adds_the_end_of_each_panel(rendered: Render) -> None:
-    figure = rendered(space_time([(T, U), (T, U), (T, U)], zoom=2.0))
+def test_periods_that_cannot_be_told_apart_are_drawn_by_their_range(rendered: Render) -> None:
+    figure = rendered(space_time([(np.linspace(0.0, 10.0, 2001), FAST)] * 3))
     pictures = [frame for frame in figure.axes if frame.images]
-    assert len(pictures) == 6
-    assert [len(frame.images[0].get_array().T) for frame in pictures] == [101] * 3 + [21] * 3
+    upper, lower = pictures[:3], pictures[3:]
+    for frame in upper:  # not the mean of a period, which looks like a fixed point
+        np.testing.assert_allclose(frame.images[0].get_array(), 2.0, atol=0.1)
+        assert frame.images[0].get_clim()[0] == 0.0
+    assert [frame.get_title(loc="left") for frame in lower] == ["last 12 of 128 periods"] * 3
+    start, end = lower[0].images[0].get_extent()[:2]
+    assert end - start == pytest.approx(12 * 2.0 * np.pi / 80.0, rel=0.05)
+    labels = [frame.get_ylabel() for frame in figure.axes[-2:]]
+    assert sorted(labels) == ["$u_i(t)$", "range of $u_i(t)$ in a period"]
 
 
 def test_space_time_grid_of_four_and_empty_places(rendered: Render) -> None:
-    figure = rendered(space_time([(T, U)] * 3, columns=2, zoom=1.0))
+    figure = rendered(space_time([(T, U)] * 3, columns=2))
     frames = figure.axes[:-1]
-    assert len(frames) == 8
-    assert sum(bool(frame.images) for frame in frames) == 6
-    assert [frame.axison for frame in frames if not frame.images] == [False, False]
+    assert [frame.axison for frame in frames] == [True, True, True, False]
 
 
-def test_last_part_keeps_both_ends() -> None:
-    t, u = last_part([0.0, 1.0, 2.0, 3.0], np.arange(8).reshape(4, 2), 1.0)
-    assert t.tolist() == [2.0, 3.0]
-    assert u.tolist() == [[4.0, 5.0], [6.0, 7.0]]
+def test_names_of_nodes_stand_along_their_axis_whatever_is_in_them(rendered: Render) -> None:
+    names = [f"$F_{i}$ 5$" for i in range(8)]
+    figure = rendered(space_time([(T, U)], ["recording"], names=names))
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == [name.replace("$", r"\$") for name in names]
+    figure = rendered(fourier_indicators([profiles()], ["recording"], names))
+    assert len(figure.axes[2].get_xticklabels()) == 8
 
 
 def profiles(std: float = 0.1) -> IndicatorProfiles:
@@ -87,14 +96,14 @@ def test_indicators_have_a_column_a_run_and_three_rows(rendered: Render) -> None
 def test_indicators_draw_means_as_dots_and_deviations_as_bands() -> None:
     amplitude = fourier_indicators([profiles()]).axes[1]
     (dots,) = amplitude.lines
-    np.testing.assert_array_equal(dots.get_xdata(), np.arange(1, 9))
+    np.testing.assert_array_equal(dots.get_xdata(), np.arange(8))
     np.testing.assert_array_equal(dots.get_ydata(), np.arange(8.0))
     (band,) = amplitude.patches
     assert isinstance(band, StepPatch)
     values, edges, baseline = band.get_data()
     np.testing.assert_allclose(values, np.arange(8.0) + 0.2)
     np.testing.assert_allclose(baseline, np.arange(8.0) - 0.2)
-    np.testing.assert_allclose(edges, np.arange(9) + 0.5)
+    np.testing.assert_allclose(edges, np.arange(9) - 0.5)
 
 
 def test_band_of_phases_is_repeated_a_turn_away() -> None:
@@ -116,3 +125,22 @@ def test_constant_profile_does_not_look_like_structure() -> None:
 def test_single_window_has_no_band_and_no_failure(rendered: Render) -> None:
     figure = rendered(fourier_indicators([profiles(np.nan)]))
     assert len(figure.axes[1].lines) == 1
+
+
+def test_profile_of_many_nodes_is_drawn_in_steps_that_reach_as_far_as_the_nodes() -> None:
+    rng = np.random.default_rng(0)
+    mean, deviation = rng.normal(size=(2, 20_000))
+    deviation = np.abs(deviation)
+    mean[12_345] = 9.0  # one node in twenty thousand
+    run = IndicatorProfiles(*[mean] * 3, *[deviation] * 3)
+    amplitude = fourier_indicators([run]).axes[1]
+    assert not amplitude.lines
+    band, means = amplitude.patches
+    assert isinstance(means, StepPatch)
+    assert isinstance(band, StepPatch)
+    high, edges, low = means.get_data()
+    assert len(high) == 400
+    step = int(np.searchsorted(edges, 12_345)) - 1
+    assert (high.max(), int(high.argmax())) == (9.0, step)
+    assert low.min() == mean.min()
+    assert band.get_data().values.max() == pytest.approx((mean + deviation).max())

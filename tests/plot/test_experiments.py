@@ -18,6 +18,7 @@ from chimera_hpc.plot.basin import basin
 from chimera_hpc.plot.density import Density, density_classes
 from chimera_hpc.plot.incoherence import Strengths, incoherence
 from chimera_hpc.plot.network import arrow_heads, networks, node_places
+from chimera_hpc.plot.raster import close_up
 from chimera_hpc.plot.robustness import Band, robustness
 from chimera_hpc.plot.spectrum import Spectrum, spectrum, vertex
 from chimera_hpc.plot.synthetic import reconstruction
@@ -79,7 +80,8 @@ def test_atlas_draws_light_classes_and_diamonds_by_the_parameter(rendered: Rende
 def test_incoherence_colours_squares_by_strength(rendered: Render, colour_at: Any) -> None:
     panel = Strengths("", [2, 3, 4], [0.0, 0.4, 1.0])
     t = np.arange(10.0)
-    figure = rendered(incoherence([panel, panel], dynamics=(t, np.outer(t, np.ones(4)))))
+    run = close_up(t, np.outer(np.ones(4), t))
+    figure = rendered(incoherence([panel, panel], dynamics=run))
     axes = figure.axes[0]
     assert colour_at(axes, 2, 0.0) == [tuple(np.round(to_rgb(style.RED), 6))]
     assert colour_at(axes, 3, 0.4) == [tuple(np.round(to_rgb(style.BLUE), 6))]
@@ -112,7 +114,7 @@ RING = np.array([(i, (i + k) % 8) for i in range(8) for k in (1, 2, 3)])
 
 def test_network_draws_reoriented_links_in_red(rendered: Render) -> None:
     turned = RING.copy()
-    turned[[0, 21]] = turned[[0, 21], ::-1]  # the links 1 - 2 and 8 - 1
+    turned[[0, 21]] = turned[[0, 21], ::-1]  # the links 0 - 1 and 7 - 0
     figure = rendered(networks([("ring", RING), ("$Q = 1$", turned)], RING, 8))
     plain, changed = figure.axes
     for axes, count in ((plain, 0), (changed, 2)):
@@ -123,7 +125,7 @@ def test_network_draws_reoriented_links_in_red(rendered: Render) -> None:
         assert same(lines[0].get_colors()[0], style.BLACK)
         assert same(lines[1].get_colors()[0], style.RED)
         assert same(heads[1].get_facecolors()[0], style.RED)
-    assert [text.get_text() for text in plain.texts] == [str(i) for i in range(1, 9)]
+    assert [text.get_text() for text in plain.texts] == [str(i) for i in range(8)]
 
 
 def test_nodes_go_clockwise_from_the_top() -> None:
