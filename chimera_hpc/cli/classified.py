@@ -29,7 +29,7 @@ def lines(
 ) -> Iterator[str]:
     """Yield what was found, for people."""
     shape = "chain" if args.open else "ring"
-    yield f"{args.file}: {made.u.shape[1]} nodes in a {shape}, {made.t[0]:.6g} to {made.t[-1]:.6g}"
+    yield f"{args.file}: {made.u.shape[1]} nodes in a {shape}, {made.t[0]:.9g} to {made.t[-1]:.9g}"
     for note in made.notes:
         yield f"  {note}"
     if scale != (1.0, 1.0):

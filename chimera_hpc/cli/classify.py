@@ -25,8 +25,8 @@ EPILOG = """examples:
       --atlas results/quickstart
 
 FILE is a time series, time by node: .npz, .npy, .csv (.tsv, .txt, .dat; .gz), .mat, .nc, or a Zarr
-store. With
-an atlas, the reduced sweep of a similar system, it is brought to the sampling step of that sweep,
+store. With an atlas, the reduced sweep of a similar system, it is brought to the sampling step of
+that sweep,
 measured by its settings, and gets the class of the nearest of its runs, with the distance to it.
 Variations of amplitude and frequency have units: --factors brings a recording in other units to
 those of the atlas, --rescale guesses the factors from the medians. What is missing is listed; files
@@ -92,16 +92,19 @@ def _answer(args: Namespace) -> list[str]:
 
     judge = None if args.atlas is None else Judge.load(args.atlas)
     settings = _settings(args.overrides, judge)
-    recording = with_times(read_recording(args.file, _choice(args)), args.step)
-    recording = in_order(recording, args.order)
+    read = read_recording(args.file, _choice(args))
     scale = _factors(args)
-    if args.rescale and judge is not None:
-        from chimera_hpc.recordings.judge import features_of, scale_to
-
-        scale = scale_to(features_of(_prepare(recording, None, args, scale), settings), judge)
-    made = _prepare(recording, None if judge is None else judge.step, args, scale)
     absolute = any(name in text for text in args.overrides for name in ("still", "steady"))
-    found = measure(made, settings, not args.open, judge, absolute)
+    try:
+        recording = in_order(with_times(read, args.step), args.order)
+        if args.rescale and judge is not None:
+            from chimera_hpc.recordings.judge import features_of, scale_to
+
+            scale = scale_to(features_of(_prepare(recording, None, args, scale), settings), judge)
+        made = _prepare(recording, None if judge is None else judge.step, args, scale)
+        found = measure(made, settings, not args.open, judge, absolute)
+    except BadInput as error:
+        raise BadInput(f"{args.file}: {error}") from None
     files = [] if args.no_figures else draw(args, made, found, settings, judge)
     if args.json:
         return [json.dumps(report(args, made, found, judge, scale, files), allow_nan=False)]
@@ -146,6 +149,9 @@ def _settings(overrides: list[str], judge: Judge | None) -> Features:
     from chimera_hpc.job.reading import apply_overrides
     from chimera_hpc.job.tables import Features
 
+    wrong = next((text for text in overrides if "=" not in text), None)
+    if wrong is not None:
+        raise BadInput(f"--set {wrong}: KEY=VALUE is needed")
     base = Features.model_validate({}) if judge is None else judge.settings
     keys = [f"features.{text.removeprefix('features.')}" for text in overrides]
     data = apply_overrides({"features": base.model_dump()}, keys)["features"]
@@ -166,9 +172,6 @@ def _prepare(
     from chimera_hpc.recordings.prepare import prepare
 
     span = (args.start, args.end)
-    try:
-        return prepare(
-            recording, step, span=span, bridge=args.bridge, scale=scale, lowpass=args.lowpass
-        )
-    except BadInput as error:
-        raise BadInput(f"{args.file}: {error}") from None
+    return prepare(
+        recording, step, span=span, bridge=args.bridge, scale=scale, lowpass=args.lowpass
+    )

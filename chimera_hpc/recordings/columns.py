@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,27 @@ from typing import Any
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.recordings.recording import Array, Recording
+from chimera_hpc.recordings.recording import TIME, Array, Recording
+from chimera_hpc.recordings.text import text_of
 
 _FEWEST = 4
 """Samples below which nothing is said of a column's course."""
-_STILL = 0.02
+STILL = 0.02
 """Standard deviation, in those of the median node, below which a node does not oscillate."""
+_HELD = 0.2
+"""Share of steps without a change from which a node is suspect, if others change in most."""
+_LONG = 50
+"""Samples from which a column may be taken for times with some jitter; a shorter one is a slope."""
 
 
 def listed(text: str, option: str) -> list[str]:
     """Return the words of a list with commas, or of the file that is called so."""
-    with suppress(OSError, ValueError):  # too long for a name of a file, or no text
-        text = Path(text).read_text(encoding="utf-8") if Path(text).is_file() else text
+    try:
+        text = text_of(Path(text).read_bytes()) if Path(text).is_file() else text
+    except BadInput as error:
+        raise BadInput(f"{option} {text}: {error}") from None
+    except (OSError, ValueError):  # too long for a name of a file
+        pass
     words = [word.strip() for word in text.replace("\n", ",").split(",") if word.strip()]
     if not words:
         raise BadInput(f"{option}: no node is named")
@@ -63,16 +71,18 @@ def without(recording: Recording, words: Sequence[str]) -> Recording:
     """Leave nodes out, by name or number from 0."""
     if not words:
         return recording
-    return _but(recording, places(recording.names, words, "--drop"), "left out (--drop)")
+    left = places(recording.names, words, "--drop")
+    note = f"{some_of([recording.names[i] for i in left], 'column')}: left out (--drop)"
+    return replace(_but(recording, left), notes=(*recording.notes, note))
 
 
-def _but(recording: Recording, left: Sequence[int], why: str) -> Recording:
-    kept = [i for i in range(len(recording.names)) if i not in left]
+def _but(recording: Recording, left: Sequence[int]) -> Recording:
+    gone = set(left)
+    kept = [i for i in range(len(recording.names)) if i not in gone]
     if not kept:
-        raise BadInput("no node is left")
+        raise BadInput("no node is left: all columns are left out, or count samples or times")
     names = tuple(recording.names[i] for i in kept)
-    note = f"{some_of([recording.names[i] for i in left])}: {why}"
-    return replace(recording, u=recording.u[:, kept], names=names, notes=(*recording.notes, note))
+    return replace(recording, u=recording.u[:, kept], names=names)
 
 
 def screened(recording: Recording, step: float | None) -> Recording:
@@ -84,7 +94,7 @@ def screened(recording: Recording, step: float | None) -> Recording:
     if len(u) < _FEWEST:
         return recording
     counters = [i for i in range(u.shape[1]) if is_counter(u[:, i])]
-    clocks = [i for i in range(u.shape[1]) if i not in counters and _goes_with(u[:, i], t)]
+    clocks = [i for i in range(u.shape[1]) if i not in counters and goes_with(u[:, i], t)]
     if t is None and clocks:
         name = recording.names[clocks[0]]
         raise BadInput(f"column {name} rises as evenly as times do: --time {name} takes it for the "
@@ -93,9 +103,18 @@ def screened(recording: Recording, step: float | None) -> Recording:
         count = u[:, counters[0]]
         if (np.diff(count) > 0.0).all():  # where it leaps, samples are missing
             recording = replace(recording, t=step * (count - count[0]))
-    left = [*counters, *clocks]
-    if left:
-        recording = _but(recording, left, "counts samples or times, not taken for a node")
+    doubtful = [i for i in clocks if not TIME.search(recording.names[i])]
+    sure = [*counters, *(i for i in clocks if i not in doubtful)]
+    notes, said = list(recording.notes), list(recording.warnings)
+    if sure:
+        who = some_of([recording.names[i] for i in sure], "column")
+        notes.append(f"{who}: counts samples or times, not taken for a node")
+    if doubtful:
+        who = some_of([recording.names[i] for i in doubtful], "column")
+        said.append(f"{who}: rises in proportion to the times, left out")
+    if sure or doubtful:
+        recording = _but(recording, [*sure, *doubtful])
+    recording = replace(recording, notes=tuple(notes), warnings=tuple(said))
     return recording
 
 
@@ -106,45 +125,55 @@ def is_counter(values: Any) -> bool:
     return bool((values % 1 == 0).all() and np.mean(np.diff(values) == 1.0) > 0.8)
 
 
-def _goes_with(values: Array, t: Array | None) -> bool:
+def goes_with(values: Array, t: Array | None) -> bool:
     """Whether a column rises in proportion to the times, or evenly where there are none."""
-    if not np.isfinite(values).all() or not (np.diff(values) > 0.0).all():
+    if len(values) < _FEWEST or not (np.isfinite(values).all() and (np.diff(values) > 0.0).all()):
         return False
     t = np.arange(len(values), dtype=np.float64) if t is None else t
     scaled = (values - values[0]) / (values[-1] - values[0])
     wanted = (t - t[0]) / (t[-1] - t[0])
-    return bool(np.abs(scaled - wanted).max() * (len(t) - 1) < 0.6)
+    return bool(np.abs(scaled - wanted).max() * (len(t) - 1) < (0.6 if len(t) >= _LONG else 1e-3))
 
 
 def suspects(u: Array, names: Sequence[str]) -> list[str]:
-    """Return a line for each kind of node that seems to be none: still, rising, doubled."""
+    """Return a line for each kind of node that seems to be none: still, rising, held, doubled."""
     lines = []
     spread = np.nanstd(u, axis=0)
-    still = spread <= _STILL * float(np.median(spread))
+    still = spread <= STILL * float(np.median(spread))
     if still.all():
         still[:] = False
     if still.any():
         where = np.flatnonzero(still).tolist()
-        lines.append(_drop([names[i] for i in where], "hardly varies beside the others"))
+        lines.append(_drop([names[i] for i in where], "hardly varies next to the others"))
     steps = np.diff(u, axis=0)
     one_way = ((steps >= 0.0) | np.isnan(steps)).all(0) | ((steps <= 0.0) | np.isnan(steps)).all(0)
     rising = np.flatnonzero(one_way & (spread > 0.0) & ~still).tolist()
     if len(rising) and len(u) >= _FEWEST:
         lines.append(_drop([names[i] for i in rising], "rises or falls throughout"))
+    same = (steps == 0.0).mean(axis=0)
+    held = (same > _HELD) & (np.median(same) < 0.5 * _HELD) & ~still & ~one_way
+    if held.any():
+        where = np.flatnonzero(held).tolist()
+        lines.append(_drop([names[i] for i in where], "keeps its value in many steps, unlike the "
+                           "others: a switch, a limit, a lost contact"))  # fmt: skip
     first: dict[bytes, int] = {}
-    same = [i for i in range(u.shape[1]) if first.setdefault(u[:, i].tobytes(), i) != i]
-    same = [i for i in same if spread[i] > 0.0]
-    if same:
-        lines.append(_drop([names[i] for i in same], "has the same values as another node"))
+    twins = [i for i in range(u.shape[1]) if first.setdefault(u[:, i].tobytes(), i) != i]
+    twins = [i for i in twins if spread[i] > 0.0]
+    if twins:
+        lines.append(_drop([names[i] for i in twins], "has the same values as another node"))
     return lines
 
 
 def _drop(names: list[str], what: str) -> str:
-    who = some_of(names)
-    return f"{who}: {what}; --drop {','.join(names[:5])} leaves it out"
+    return f"{some_of(names)}: {what}; {how_to_drop(names)}"
 
 
-def some_of(names: Sequence[str]) -> str:
+def how_to_drop(names: Sequence[str]) -> str:
+    """Say how nodes are left out."""
+    return f"--drop {','.join(names[:5])} leaves it out"
+
+
+def some_of(names: Sequence[str], kind: str = "node") -> str:
     """Return the first five names, with commas."""
-    many = "node" if len(names) == 1 else "nodes"
+    many = kind if len(names) == 1 else f"{kind}s"
     return f"{many} {', '.join(names[:5])}" + (", ..." if len(names) > 5 else "")

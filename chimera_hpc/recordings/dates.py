@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import warnings
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,26 +12,63 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.recording import Array
 
 _DAY, _HOUR = 86400.0, 3600.0
-_CLOCK = r"(\d+):(\d{1,2})(?::(\d{1,2}))?(?:[.,](\d+))?\s*([AaPp]\.?[Mm]\.?)?"
-_DATE = r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})\.?(?:[ T,]+(.*))?"
-_COMPACT = r"(\d{4})(\d\d)(\d\d)(?:[ T_-]?(\d\d):?(\d\d)(?::?(\d\d(?:[.,]\d+)?))?)?"
+_CLOCK = r"(?:(\d+) days?,? +)?(\d+):(\d{1,2})(?::(\d{1,2}))?(?:[.,](\d+))?\s*([AaPp]\.?[Mm]\.?)?"
+_DATE = r"(\d{1,4})([-./])(\d{1,4})\2(\d{1,4})\.?(?:[ T,]+(.*))?"
+_COMPACT = (
+    r"((?:1[89]|2[01])\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01]))"
+    r"(?:[ T_-]?([01]\d|2[0-3]):?([0-5]\d)(?::?([0-5]\d)(?:[.,]?(\d+))?)?)?"
+)
+DATED = "dates were taken for seconds since the first"
+_UNITS = (("seconds", 1.0), ("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
+"""What times since 1970 are counted in."""
 
 
-def compact_dates(values: Array) -> tuple[Array, list[str]] | None:
-    """Return the seconds of whole numbers YYYYMMDD or YYYYMMDDhhmmss; None for other numbers."""
+class Times(NamedTuple):
+    """Seconds (T,), what was understood, and what speaks against it."""
+
+    t: Array
+    notes: list[str]
+    warnings: list[str]
+
+
+def is_compact(words: Any) -> bool:
+    """Whether these are dates without marks between their parts: YYYYMMDD, YYYYMMDDhhmm, ..."""
+    return bool(words.notna().all() and words.astype(str).str.fullmatch(_COMPACT).all())
+
+
+def is_date(words: Any) -> bool:
+    """Whether these are dates without a time of day."""
+    parts = words.astype(str).str.extract(f"^{_DATE}$")
+    whole = bool(parts[[0, 1, 2, 3]].notna().all(axis=None) and parts[4].isna().all())
+    return whole or (is_compact(words) and bool(words.str.len().eq(8).all()))
+
+
+def is_clock(words: Any) -> bool:
+    """Whether these are times of day."""
+    return bool(words.notna().all() and words.astype(str).str.fullmatch(_CLOCK).all())
+
+
+def of_numbers(values: Array) -> Times:
+    """Return numbers as they are, but dates YYYYMMDD, ... in seconds since the first.
+
+    Numbers that look like times since 1970 in another unit than seconds are warned of.
+    """
     import pandas as pd
 
-    for form, least, most in (("%Y%m%d", 18e6, 22e6), ("%Y%m%d%H%M%S", 18e12, 22e12)):
-        if ((values >= least) & (values < most) & (values % 1 == 0)).all():
-            found = pd.to_datetime(pd.Series(values.astype(np.int64).astype(str)), format=form,
-                                   errors="coerce")  # fmt: skip
-            if not found.isna().any():
-                note = f"numbers like {values[0]:.0f} were taken for dates, in seconds"
-                return _seconds(found), [note]
-    return None
+    low, high = (values.min(), values.max()) if np.isfinite(values).all() else (0.0, 0.0)
+    if low >= 18e6 and high < 22e12 and (values % 1 == 0).all():
+        words = pd.Series(values.astype(np.int64).astype(str))
+        if is_compact(words):
+            return _compact(words)
+    for name, factor in _UNITS[1:]:
+        if 0.9e9 * factor <= low and high < 2.2e9 * factor:
+            said = (f"times look like {name} since 1970: frequencies are per {name[:-1]}; "
+                    f"--factors {1.0 / factor:g},1 makes them per second")  # fmt: skip
+            return Times(values, [], [said])
+    return Times(values, [], [])
 
 
-def seconds_of(words: Any, name: str) -> tuple[Array, list[str]]:
+def seconds_of(words: Any, name: str) -> Times:
     """Return the seconds since the first of dates or times of day, a pandas series of words.
 
     The order of day, month and year is the one that makes the steps most even; where none does,
@@ -38,91 +76,124 @@ def seconds_of(words: Any, name: str) -> tuple[Array, list[str]]:
     """
     import pandas as pd
 
-    clock = words.str.fullmatch(_CLOCK)
-    if clock.all():
-        t, how = _clock(words, name, day=None)
-        return t - t[0], [how]
+    words = words.str.replace(r"\s*(?:UTC|GMT)$", "Z", regex=True)
+    if is_clock(words):
+        t, notes, said = _clock(words, name, dated=False)
+        return Times(t - t[0], notes, said)
+    if is_compact(words):
+        return _compact(words)
     parts = words.str.extract(f"^{_DATE}$")
     if parts[[0, 1, 2, 3]].notna().all(axis=None):
         rest = parts[4].fillna("00:00")
-        if rest.str.fullmatch(_CLOCK).all():
-            return _ordered(parts, _clock(rest, name, day=True)[0], name)
+        if is_clock(rest):
+            return _ordered(parts, _clock(rest, name, dated=True).t, name)
     try:
         with warnings.catch_warnings(action="error"):  # an unknown time zone loses hours
             dotted = words.str.replace(r"(\d),(\d+)", r"\1.\2", regex=True)
             form: Any = "ISO8601" if words.str.match(r"\d{4}-?\d\d-?\d\d").all() else "mixed"
-            if form == "mixed" and words.str.match(r"\d+[-./]\d+").any():
+            if form == "mixed" and words.str.match(r"\d+[-./]\d+|\d+$").any():
                 raise ValueError(name)
             zoned = words.str.contains(r"(?:Z|[+-]\d\d:?\d\d)$").mean()
             if zoned not in (0.0, 1.0):
                 raise ValueError(name)
             found = pd.to_datetime(dotted, format=form, utc=True)
     except (ValueError, TypeError, OverflowError, Warning):
-        raise BadInput(f"column {name}: {words.iloc[0]!r} is no time; write seconds, or "
+        strange = words[~words.str.fullmatch(r"[-+.,\deE]+|[\d:.,\s/TZ-]+")]
+        word = words.iloc[0] if strange.empty else strange.iloc[0]
+        raise BadInput(f"column {name}: {word!r} is no time; write seconds, or "
                        "2026-01-31 12:00:00") from None  # fmt: skip
-    return _seconds(found), ["dates were taken for seconds since the first"]
+    return Times(_seconds(found), [DATED], [])
 
 
-def _clock(words: Any, name: str, day: bool | None) -> tuple[Array, str]:
-    """Return seconds of times of day; without a date they go on past midnight."""
-    parts = words.str.extract(f"^{_CLOCK}$")
-    first, second, third = (parts[i].astype(float) for i in range(3))
-    digits = parts[3].fillna("0")
-    fraction = digits.astype(float) / 10.0 ** digits.str.len()
-    if parts[2].notna().all() or day:
-        after = parts[4].str.upper().str.replace(".", "", regex=False)
-        hours = first.where(after.isna(), first % 12 + 12.0 * (after == "PM"))
-        t = hours * _HOUR + second * 60 + third.fillna(0.0) + fraction
-        how, period = "times of day hh:mm:ss", _DAY
-    elif parts[2].isna().all() and (parts[3].notna().all() or first.max() >= 24):
-        t, how, period = first * 60 + second + fraction, "times mm:ss", _HOUR
-    else:
-        raise BadInput(f"column {name}: {words.iloc[0]!r}: hh:mm or mm:ss? write seconds, or "
-                       "hh:mm:ss")  # fmt: skip
-    t = t.to_numpy(dtype=np.float64)
-    if not day and t.max() < period:
-        t = t + period * np.cumsum(np.concatenate([[0], np.diff(t) < -0.5 * period]))
-    return t, f"{how}, in seconds"
-
-
-def _ordered(parts: Any, clock: Array, name: str) -> tuple[Array, list[str]]:
-    """Return the seconds of dates in the order that fits them best."""
+def _compact(words: Any) -> Times:
     import pandas as pd
 
+    parts = words.str.extract(f"^{_COMPACT}$").fillna("0")
+    days = pd.to_datetime(parts[0], format="%Y%m%d", errors="coerce")
+    if days.isna().any():
+        raise BadInput(f"{words[days.isna()].iloc[0]!r} is no date")
+    hour, minute, second = (parts[i].astype(float).to_numpy() for i in (1, 2, 3))
+    fraction = parts[4].astype(float) / 10.0 ** parts[4].str.len()
+    t = _seconds(days) + _HOUR * hour + 60.0 * minute + second + fraction.to_numpy()
+    note = f"numbers like {words.iloc[0]} were taken for dates, in seconds since the first"
+    return Times(t - t[0], [note], [])
+
+
+def _clock(words: Any, name: str, dated: bool) -> Times:
+    """Return seconds of times of day; without a date they go on past midnight."""
+    parts = words.str.extract(f"^{_CLOCK}$")
+    days, first, second, third = (parts[i].astype(float) for i in range(4))
+    digits = parts[4].fillna("0")
+    fraction = digits.astype(float) / 10.0 ** digits.str.len()
+    said: list[str] = []
+    if dated or third.notna().all() or _says(name, r"h+:m"):
+        after = parts[5].str.upper().str.replace(".", "", regex=False)
+        hours = first.where(after.isna(), first % 12 + 12.0 * (after == "PM"))
+        t = days.fillna(0.0) * _DAY + hours * _HOUR + second * 60 + third.fillna(0.0) + fraction
+        how, period = "times of day hh:mm:ss", _DAY
+        wrong = (second >= 60.0) | (third >= 60.0) | ((first >= 24.0) & (days.notna() | dated))
+    elif third.isna().all() and (parts[4].notna().any() or first.max() >= 24):
+        t, how, period = first * 60 + second + fraction, "times mm:ss", _HOUR
+        wrong = second >= 60.0
+        if parts[4].isna().all() and not _says(name, r"m+:s") and not (first.diff() < -30.0).any():
+            said.append(f"{words.iloc[-1]!r} was taken for mm:ss; if it is hh:mm, call the column "
+                        "'time hh:mm'")  # fmt: skip
+    else:
+        raise BadInput(f"column {name}: {words.iloc[0]!r}: hh:mm or mm:ss? call the column "
+                       "'time mm:ss' or 'time hh:mm', or write seconds")  # fmt: skip
+    if wrong.any():
+        raise BadInput(f"column {name}: {words[wrong].iloc[0]!r} is no time: hours go to 23, "
+                       "minutes and seconds to 59")  # fmt: skip
+    t = t.to_numpy(dtype=np.float64)
+    if not dated and t.max() < period:
+        t = t + period * np.cumsum(np.concatenate([[0], np.diff(t) < -0.5 * period]))
+    return Times(t, [f"{how}, in seconds"], said)
+
+
+def _says(name: str, form: str) -> bool:
+    return re.search(form, name, re.IGNORECASE) is not None
+
+
+def _ordered(parts: Any, clock: Array, name: str) -> Times:
+    """Return the seconds of dates in the order that fits them best."""
     wide = [int(parts[i].str.len().max()) for i in (0, 2, 3)]
     mark = parts[1].iloc[0]
+    orders: tuple[str, ...] = ("dmy", "mdy", "ymd", "ydm")
     if 4 in wide:
-        orders: tuple[str, ...] = {0: ("ymd", "ydm"), 1: ("dym", "myd"), 2: ("dmy", "mdy")}[
-            wide.index(4)
-        ]
-    else:
-        orders = ("dmy", "mdy", "ymd", "ydm")
-    made: list[tuple[float, str, Array]] = []
-    for order in orders:
-        cells = {key: parts[i].astype(int) for key, i in zip(order, (0, 2, 3), strict=True)}
-        year = cells["y"].where(cells["y"] > 99, cells["y"] + 2000)
-        day = pd.to_datetime({"year": year, "month": cells["m"], "day": cells["d"]},
-                             errors="coerce")  # fmt: skip
-        if day.isna().any():
-            continue
-        t = _seconds(day) + clock
-        steps = np.diff(t)
-        if (steps > 0.0).all():
-            uneven = (
-                float(np.mean(np.abs(steps / np.median(steps) - 1.0) > 0.5)) if len(steps) else 0.0
-            )
-            made.append((uneven, order, t - t[0]))
+        orders = {0: orders[2:], 1: ("dym", "myd"), 2: orders[:2]}[wide.index(4)]
+    made = [one for order in orders if (one := _read_as(order, parts, clock)) is not None]
     if not made:
         raise BadInput(f"column {name}: dates do not rise, in whatever order of day, month and "
                        "year (a clock set back by summer time?)")  # fmt: skip
     best = [one for one in made if one[0] <= min(made)[0]]
+    if mark == ".":  # day first; with two digits of the year, the day is what changes fastest
+        best = [one for one in best if one[1] != "mdy"] or best
+        best.sort(key=lambda one: 0.0 if 4 in wide else float(one[2][-1]))
     usual = mark == "." or orders[0] == "ymd"
     if any(not np.array_equal(one[2], best[0][2]) for one in best[1:]) and not usual:
         raise BadInput(f"column {name}: {' or '.join(one[1] for one in best)}? the order of day, "
                        "month and year is open; write 2026-01-31")  # fmt: skip
     names = {"d": "day", "m": "month", "y": "year"}
     said = ", ".join(names[key] for key in best[0][1])
-    return best[0][2], [f"dates were taken for seconds since the first; order: {said}"]
+    note = f"{DATED}; order: {said}"
+    return Times(best[0][2], [note], [])
+
+
+def _read_as(order: str, parts: Any, clock: Array) -> tuple[float, str, Array] | None:
+    """Return the share of uneven steps, the order and the seconds; None if no such dates rise."""
+    import pandas as pd
+
+    cells = {key: parts[i].astype(int) for key, i in zip(order, (0, 2, 3), strict=True)}
+    year = cells["y"].where(cells["y"] > 99, cells["y"] + 2000)
+    day = pd.to_datetime({"year": year, "month": cells["m"], "day": cells["d"]}, errors="coerce")
+    if day.isna().any():
+        return None
+    t = _seconds(day) + clock
+    steps = np.diff(t)
+    if not (steps > 0.0).all():
+        return None
+    uneven = np.mean(np.abs(steps / np.median(steps) - 1.0) > 0.5) if len(steps) else 0.0
+    return float(uneven), order, t - t[0]
 
 
 def _seconds(found: Any) -> Array:

@@ -18,6 +18,7 @@ from chimera_hpc.measures.fourier import FourierFeatures, measure_signals
 from chimera_hpc.measures.quality import FEW_SAMPLES
 from chimera_hpc.measures.variation import total_variation_arrays
 from chimera_hpc.measures.windows import maxima
+from chimera_hpc.recordings.columns import STILL, how_to_drop, some_of
 from chimera_hpc.recordings.gaps import called
 from chimera_hpc.recordings.prepare import Prepared
 from chimera_hpc.reduction.atlases import load_atlas
@@ -25,10 +26,16 @@ from chimera_hpc.store.store import Store
 
 Array = NDArray[np.float64]
 
-_FLAT = 1e-6
-"""Standard deviation, in root mean squares of the signal, below which it is steady."""
+_FLAT = 1e-12
+"""Standard deviation, in root mean squares of the signal, below which it is steady: rounding."""
+_FAINT = 1e-6
+"""The same, below which a line says so."""
+_POOR = 0.3
+"""Share of a node's variance in its sine below which its features say little."""
 _SMALL = 1e-2
 """The same, below which the threshold of a sweep counts."""
+_TURNS = 1.5
+"""Turns in a window below which a node's sine is that of a drift."""
 _BLOCKS = 20
 _MAXIMA = 1.02
 """Maxima a turn of the clock beyond which some are put down to noise."""
@@ -123,7 +130,8 @@ def measure(
     """
     n_nodes, least = made.u.shape[1], 3 if ring else 2
     if n_nodes < least:
-        raise BadInput(f"{n_nodes} nodes: a {'ring' if ring else 'chain'} has at least {least}")
+        what = "1 node" if n_nodes == 1 else f"{n_nodes} nodes"
+        raise BadInput(f"{what}: a {'ring' if ring else 'chain'} has at least {least}")
     limit, warnings = _steady_below(made.u, settings.steady_threshold, judge, absolute)
     features = features_of(made, settings, limit)
     triplet = total_variation_arrays(
@@ -136,10 +144,11 @@ def measure(
         if count < FEW_SAMPLES and (step, what) != (made.recorded_step, "the grid"):
             node = called(made.names[int(np.nanargmax(features.frequency))])
             warnings.append(
-                f"{what} has {count:.3g} samples a period ({node}); below "
+                f"{what} has {count:.3g} samples per period ({node}); below "
                 f"{FEW_SAMPLES:g} maxima and windows are placed coarsely"
             )
     warnings += _noise(made, settings, features)
+    warnings += _poor(made, settings, features)
     verdict = None
     if judge is not None and features.status is Status.DONE:
         verdict = verdict_of(judge.atlas, np.array(triplet))
@@ -171,6 +180,9 @@ def _steady_below(
     """
     deviation, size = float(u.std(axis=0).mean()), _size(u)
     own = _FLAT * size
+    if own <= deviation < min(_FAINT * size, threshold if absolute else np.inf):
+        return own, [f"signals vary by {deviation:.3g} (standard deviation) round a level of "
+                     f"{size:.6g}: rounding, or the output of a solver at rest?"]  # fmt: skip
     if deviation >= threshold or deviation < own or not (absolute or judge is not None):
         return (threshold if absolute else own), []
     said = (
@@ -225,6 +237,25 @@ def _noise(made: Prepared, settings: Features, features: FourierFeatures) -> lis
         f"{called(made.names[node])}, the clock, has {count} maxima in {turns:.0f} turns: noise? "
         "Windows follow the maxima; --lowpass F damps frequencies above F"
     ]
+
+
+def _poor(made: Prepared, settings: Features, features: FourierFeatures) -> list[str]:
+    """Return a line where sines are a small part of what nodes do: noise, drift, an outlier."""
+    if features.status is not Status.DONE:
+        return []
+    spread = made.u.std(axis=0)
+    moving = spread > STILL * np.median(spread)  # the others are named already
+    share = 0.5 * (features.amplitude / np.where(moving, spread, np.inf)) ** 2
+    if 2 * np.sum((share < _POOR) & moving) > len(share):
+        return [f"a sine holds only {float(np.median(share)):.0%} of the variance of the median "
+                "node: amplitudes, frequencies and phases say little"]  # fmt: skip
+    clock = max(float(features.frequency[settings.reference_node]), 1e-300)
+    turns = (settings.n_peaks - 1) * features.frequency / clock
+    poor = np.flatnonzero(((share < _POOR) | (turns < _TURNS)) & moving).tolist()
+    names = [made.names[i] for i in poor]
+    return [f"{some_of(names)}: a sine holds less than {_POOR:.0%} of the variance, or has fewer "
+            f"than {_TURNS:g} turns in a window: noise, drift or outliers? {how_to_drop(names)}"
+            ] if poor else []  # fmt: skip
 
 
 def _unlike(features: FourierFeatures, judge: Judge) -> list[str]:

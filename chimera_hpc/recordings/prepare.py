@@ -21,6 +21,8 @@ _EVEN = 1e-2
 """Largest departure of a time from an even grid, in steps: as `fourier_features` allows."""
 _SAME = 1e-6
 """Relative difference below which two steps are the same."""
+_SLOWEST = 1e-5
+"""Lowest frequency of the low-pass filter, per sample: below, its equations are singular."""
 _PADDING = 15
 """Samples that the low-pass filter reflects at each end."""
 _LEAST = 1e-100
@@ -56,6 +58,8 @@ def with_times(recording: Recording, step: float | None) -> Recording:
     Raises BadInput: neither has times, or both; times that are not finite or do not rise.
     """
     own = recording.t is not None
+    if recording.t is not None:
+        _refuse_times(recording.t)
     if step is None or (np.isfinite(step) and step > 0.0):
         recording = screened(recording, step)
     if recording.t is None:
@@ -65,9 +69,12 @@ def with_times(recording: Recording, step: float | None) -> Recording:
             raise BadInput(f"--step {step}: a number above 0 is needed")
         t = step * np.arange(len(recording.u), dtype=np.float64)
         return replace(recording, t=t)
-    t = recording.t
     if own and step is not None:
         raise BadInput("the file has times of its own: leave --step out")
+    return recording
+
+
+def _refuse_times(t: Array) -> None:
     wrong = np.flatnonzero(~np.isfinite(t))
     if len(wrong):
         raise BadInput(f"time {wrong[0]} (from 0) is missing")
@@ -75,7 +82,6 @@ def with_times(recording: Recording, step: float | None) -> Recording:
     if len(falls):
         i = int(falls[0])
         raise BadInput(f"times must rise: {t[i + 1]:.9g} follows {t[i]:.9g} (samples {i}, {i + 1})")
-    return recording
 
 
 def in_order(recording: Recording, order: str | None) -> Recording:
@@ -120,19 +126,23 @@ def prepare(
     assert recording.t is not None
     t, u = recording.t * scale[0], np.where(np.isfinite(recording.u), recording.u, np.nan)
     u *= scale[1]
-    if not ((np.diff(t) > _LEAST).all() and np.isfinite(t).all() and not np.isinf(u).any()):
-        raise BadInput("--factors: times or signals leave the range of numbers")
+    largest = float(np.nanmax(np.abs(u), initial=0.0))
+    if not ((np.diff(t) > _LEAST).all() and np.isfinite(t).all() and largest < 1.0 / _LEAST
+            and (largest > _LEAST or not largest)):  # fmt: skip
+        raise BadInput("times or signals leave the range of numbers, 1e-100 to 1e100; --factors "
+                       "brings them back")  # fmt: skip
     first, last = (x if x is None else x * scale[0] for x in span)
     inside = (t >= (t[0] if first is None else first)) & (t <= (t[-1] if last is None else last))
     t, u = t[inside], u[inside]
     if len(t) < 3:
-        raise BadInput(f"{len(t)} samples between --start and --end: too few")
+        where = "in the recording" if len(t) == len(recording.t) else "between --start and --end"
+        raise BadInput(f"too few samples {where}: {len(t)}; at least 3 are needed")
     _refuse_empty(u, recording.names)
     usual = float(np.median(np.diff(t)))
     around = nearby(t)
     gaps = find_gaps(t, u, around)
     part = longest_stretch(t, u, around, bridge)
-    notes, warned = list(recording.notes), []
+    notes, warned = list(recording.notes), list(recording.warnings)
     if gaps:
         values, times = int(np.isnan(u).sum()), sum(g.samples for g in gaps if g.node is None)
         counts = {"values": values, "times": times}
@@ -190,9 +200,12 @@ def _smooth(u: Array, cut: float, t: Array, recorded_step: float) -> Array:
     step = float(t[1] - t[0])
     if not 0.0 < cut < 0.5 / max(step, recorded_step):
         raise BadInput(
-            f"--lowpass: {cut:g} a unit of time is not between 0 and half the sampling frequency, "
-            f"{0.5 / max(step, recorded_step):g}"
+            f"--lowpass: {cut:g} per unit of time is not between 0 and half the sampling "
+            f"frequency, {0.5 / max(step, recorded_step):g}"
         )
+    if cut * step < _SLOWEST:
+        raise BadInput(f"--lowpass: {cut:g} per unit of time is too low: at least "
+                       f"{_SLOWEST / step:g}")  # fmt: skip
     if len(u) <= _PADDING:
         raise BadInput(f"--lowpass: {len(u)} samples are too few, {_PADDING + 1} are needed")
     sections = butter(4, 2.0 * cut * step, output="sos")

@@ -16,6 +16,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.columns import without
+from chimera_hpc.recordings.dates import DATED, of_numbers
 from chimera_hpc.recordings.recording import TIME, Choice, Recording, as_signals, as_times, turned
 from chimera_hpc.recordings.tables import read_table
 
@@ -40,6 +41,7 @@ def read_recording(path: Path, choice: Choice) -> Recording:
             path = path / "store.zarr"
         with _quiet():
             reader = _reader(path)
+            _refuse_options(reader, choice)
             made = turned(reader(path, choice), choice)
         return made if reader is read_table else without(made, choice.drop)
     except BadInput as error:
@@ -60,6 +62,15 @@ def _reader(path: Path) -> Reader:
     if reader is None or (name.endswith(".gz") and reader is not read_table):
         raise BadInput(f"allowed are {', '.join(READERS)}, tables with .gz too, and Zarr stores")
     return reader
+
+
+def _refuse_options(reader: Reader, choice: Choice) -> None:
+    """Refuse what the user says of arrays or dimensions that a file of this kind has not."""
+    labelled = reader in (_read_netcdf, _read_zarr)
+    if choice.select and not labelled:
+        raise BadInput(f"--select {choice.select[0][0]}: a file of this kind names no dimensions")
+    if choice.variable and reader in (_read_npy, read_table):
+        raise BadInput(f"--variable {choice.variable}: a file of this kind has no named arrays")
 
 
 def _read_npy(path: Path, choice: Choice) -> Recording:
@@ -85,7 +96,7 @@ def _read_mat(path: Path, choice: Choice) -> Recording:
     from scipy.io.matlab import MatReadError
 
     try:
-        arrays = loadmat(path)
+        arrays = _flat(loadmat(path, simplify_cells=True))
     except NotImplementedError:
         arrays = _read_mat73(path)
     except (MatReadError, ValueError, TypeError, IndexError, KeyError) as error:
@@ -94,13 +105,29 @@ def _read_mat(path: Path, choice: Choice) -> Recording:
     return _arrays({k: a for k, a in plain.items() if a.dtype.kind in "iufc"}, choice)
 
 
+def _flat(values: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Return the arrays of a structure and of those inside it, as ``outer.inner``."""
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{above}{name}.")
+        else:
+            found[above + name] = np.asarray(value)
+    return found
+
+
 def _read_mat73(path: Path) -> dict[str, Any]:
     try:
         import h5py  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
-        raise BadInput("is a MATLAB 7.3 file: python -m pip install h5py") from None
+        raise BadInput("is a MATLAB 7.3 file, which needs the package h5py: "
+                       "python -m pip install h5py") from None  # fmt: skip
     with h5py.File(path) as file:  # HDF5 has the axes of MATLAB in reverse
-        return {k: np.asarray(a).T for k, a in file.items() if isinstance(a, h5py.Dataset)}
+        names: list[str] = []
+        file.visit(names.append)
+        arrays = {name: file[name] for name in names if not name.startswith("#")}
+        return {k.replace("/", "."): np.asarray(a).T for k, a in arrays.items()
+                if isinstance(a, h5py.Dataset)}  # fmt: skip
 
 
 def _arrays(shapes: dict[str, Any], choice: Choice) -> Recording:
@@ -110,14 +137,20 @@ def _arrays(shapes: dict[str, Any], choice: Choice) -> Recording:
     name = _choose("array", choice.variable, signals, list(shapes))
     time = choice.time
     if time is None:
-        time = next(
-            (key for key, a in shapes.items() if TIME.search(key) and a.ndim and key != name), None
-        )
+        likely = [key for key, a in shapes.items() if key != name and a.ndim == 1
+                  and TIME.search(key) and len(a) in np.shape(shapes[name])]  # fmt: skip
+        time = min(likely, key=lambda key: key.rpartition(".")[2].lower() not in _TIMES,
+                   default=None)  # fmt: skip
     elif time not in shapes:
         raise BadInput(f"--time {time}: the file has {', '.join(shapes)}")
     notes = [f"signals: array {name}"] + ([f"times: array {time}"] if time else [])
-    t = None if time is None or choice.no_times else as_times(time, shapes[time])
-    return Recording(t, as_signals(name, shapes[name]), (), tuple(notes))
+    u = as_signals(name, shapes[name])
+    if time is None or choice.no_times:
+        return Recording(None, u, (), tuple(notes))
+    t, how, said = of_numbers(as_times(time, shapes[time]))
+    if shapes[time].dtype.kind in "mM":
+        how = [DATED]
+    return Recording(t, u, (), (*notes, *how), tuple(said))
 
 
 def _names(archive: Any) -> list[str]:
@@ -203,7 +236,7 @@ def _labelled(dataset: Any, choice: Choice) -> Recording:
     names = tuple(map(str, array.coords[node].values)) if node in array.coords else ()
     notes = [f"signals: variable {name}", f"times: {time}, nodes: {node}"]
     if t is not None and array.coords[time].dtype.kind in "mM":
-        notes.append("dates were taken for seconds since the first")
+        notes.append(DATED)
     return Recording(t, u, names, tuple(notes))
 
 
@@ -228,7 +261,7 @@ def _choose(kind: str, asked: str | None, usable: Mapping[str, Any], known: list
         return asked
     if len(usable) == 1:
         return next(iter(usable))
-    named = [name for name in usable if name.lower() in _SIGNALS]
+    named = [name for name in usable if name.rpartition(".")[2].lower() in _SIGNALS]
     if len(named) == 1:
         return named[0]
     if not usable:

@@ -49,13 +49,14 @@ class Recording:
     t (T,): times; seconds where the file has dates. None where the file has none.
     u (T, N): NaN where a value is missing.
     names: names of the nodes, their numbers from 0 where the file has none.
-    notes: what was taken for what, a line each.
+    notes, warnings: what was taken for what, and what speaks against it, a line each.
     """
 
     t: Array | None
     u: Array
     names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.names:
@@ -102,11 +103,12 @@ def turned(recording: Recording, choice: Choice) -> Recording:
         )
     if choice.transpose or (fits_turned and not fits):
         note = f"rows are nodes: {u.shape[0]} nodes, {u.shape[1]} times"
-        recording = Recording(t, u.T, (), (*recording.notes, note))
+        recording = Recording(t, u.T, (), (*recording.notes, note), recording.warnings)
         u = recording.u
-    elif open_ and across < along / _SMOOTH:
-        note = "rows are smoother than columns: if they are nodes, --transpose turns them"
-        recording = replace(recording, notes=(*recording.notes, note))
+    elif open_ and (across < along / _SMOOTH or (t is None and u.shape[1] > u.shape[0])):
+        said = (f"{u.shape[0]} times of {u.shape[1]} nodes were read: if rows are nodes, "
+                "--transpose turns them")  # fmt: skip
+        recording = replace(recording, warnings=(*recording.warnings, said))
     if t is not None and len(t) != len(u):
         raise BadInput(f"{len(t)} times for {len(u)} samples of {u.shape[1]} nodes")
     return recording

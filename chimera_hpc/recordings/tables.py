@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import gzip
 import io
 import re
 from collections import Counter
@@ -13,11 +12,22 @@ from typing import Any
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.recordings.columns import is_counter, places, without
-from chimera_hpc.recordings.dates import compact_dates, seconds_of
-from chimera_hpc.recordings.recording import TIME, Array, Choice, Recording
+from chimera_hpc.recordings.columns import goes_with, is_counter, places, without
+from chimera_hpc.recordings.dates import (
+    Times,
+    is_clock,
+    is_compact,
+    is_date,
+    of_numbers,
+    seconds_of,
+)
+from chimera_hpc.recordings.recording import TIME, Choice, Recording
+from chimera_hpc.recordings.text import text_of
 
 _HEAD = 200
+_SAMPLE = 1000
+"""Lines of numbers whose digits are looked at."""
+_MOST = 0.9
 _MISSING = ["", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "#n/a",
             "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!"]  # fmt: skip
 _COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
@@ -39,45 +49,38 @@ def read_table(path: Path, choice: Choice) -> Recording:
         every) else set()  # fmt: skip
     kept = [i for i in range(len(table)) if i not in left]
     columns = {i: _numbers(every[i], table[i]) for i in kept}
+    _refuse_points(columns, table, every, [_cells(line, delimiter) for line in lines[:_SAMPLE]])
     time, note = _time(columns, every, choice, bool(names))
+    clock = None if time is None else columns[time]
+    day = next((i for i in kept if _is_day_of(columns[i], clock)), None)
     nodes = []
-    for i in (i for i in kept if i != time):
+    for i in (i for i in kept if i not in (time, day)):
         values = columns[i]
         if isinstance(values, np.ndarray):
             if names and not names[i] and np.isnan(values).all():
                 continue  # a delimiter at the end of each line
             nodes.append(i)
-        elif time is not None and TIME.search(every[i]):
+        elif time is not None and (TIME.search(every[i]) or is_date(values)):
             notes.append(f"column {every[i]} is left out: the times are column {every[time]}")
         else:
             raise BadInput(f"column {every[i]}: {_word(values)!r} is not a number; --drop leaves "
                            "columns out")  # fmt: skip
     if not nodes:
         raise BadInput("has no column of signals")
-    t = None
+    t, said = None, list[str]()
     if time is not None:
-        t, how = _times(columns[time], every[time])
-        notes += [note, *how]
+        t, how, said = _times(_on_day(columns, time, day), every[time])
+        notes += [note if day is None else f"times: columns {every[day]} and {every[time]}", *how]
     else:
         notes.append("every column is a node")
     u = np.column_stack([columns[i] for i in nodes])
-    made = Recording(t, u, tuple(every[i] or "index" for i in nodes) if names else (), tuple(notes))
+    called = tuple(every[i] or "index" for i in nodes) if names else ()
+    made = Recording(t, u, called, tuple(notes), tuple(said))
     return made if left else without(made, choice.drop)
 
 
 def _lines(path: Path) -> list[str]:
-    raw = path.read_bytes()
-    raw = gzip.decompress(raw) if path.suffix.lower() == ".gz" else raw
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        text = raw.decode("utf-16")
-    else:
-        try:
-            text = raw.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = raw.decode("cp1252", "replace")
-    if "\0" in text:
-        raise BadInput("can't be read as text: it holds bytes of value 0")
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = text_of(path.read_bytes()).split("\n")
     found = [line for line in lines if line.strip(" ;,\t") and not line.lstrip().startswith("#")]
     if not found:
         raise BadInput("is empty")
@@ -88,10 +91,10 @@ def _delimiter(lines: list[str]) -> str | None:
     """Return what stands between the cells of the last lines; None for blanks."""
     tail = lines[-_HEAD:][-max(1, len(lines) // 2) :]
     for mark in (";", "\t"):
-        if all(mark in line for line in tail):
+        if np.mean([mark in line for line in tail]) > _MOST:  # a line of words may end the file
             return mark
     blanks = all(len(w := line.split()) > 1 and all(map(_COMMA.fullmatch, w)) for line in tail)
-    return "," if not blanks and all("," in line for line in tail) else None
+    return "," if not blanks and np.mean(["," in line for line in tail]) > _MOST else None
 
 
 def _cells(line: str, delimiter: str | None) -> list[str]:
@@ -131,11 +134,12 @@ def _named(
     notes, names = [], []
     fitting = [cells for cells in head if len(cells) in (count, count - 1)]
     if fitting:
-        names = fitting[0]
+        chosen = max(fitting, key=lambda cells: len(set(cells)))  # units repeat, names do not
+        names = chosen
         if len(names) < count:  # a delimiter ends each line, or R wrote the names of the rows
             ends = not _cells(lines[0], delimiter)[-1]
             names = [*names, ""] if ends else ["", *names]
-        notes += [f"left out above the numbers: {' '.join(c)}" for c in head if c is not fitting[0]]
+        notes += [f"left out above the numbers: {' '.join(c)}" for c in head if c is not chosen]
     elif head:
         raise BadInput(f"can't be read as a table: {len(head[-1])} names for {count} columns")
     seen: Counter[str] = Counter()
@@ -144,12 +148,15 @@ def _named(
         if name and seen[name] > 1:
             names[i] = f"{name}.{seen[name] - 1}"
             notes.append(f"two columns are called {name}: the later is {names[i]}")
+    firsts = pd.Series([c.strip() for c in _cells(lines[0], delimiter)])
+    dated = [i for i, word in enumerate(firsts) if is_compact(firsts[i : i + 1])]
     try:
         table = pd.read_csv(
             io.StringIO("\n".join(lines)),
             sep=delimiter or r"\s+",
             header=None,
             names=list(range(count)),
+            dtype=dict.fromkeys(dated, str),  # 20260131120000.25 has more digits than a float
             skipinitialspace=True,
             index_col=False,
             low_memory=False,
@@ -185,6 +192,10 @@ def _numbers(name: str, column: Any) -> Any:
         return column.to_numpy(dtype=np.float64)
     words = column.astype(object)
     known = words.dropna().astype(str).str.strip()
+    if is_compact(known):
+        return words
+    if known.str.fullmatch(r"[-+]?\d+(\.\d*)?").all():
+        return pd.to_numeric(known).reindex(column.index).to_numpy(dtype=np.float64)
     if not known.str.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?").all():
         return words
     comma = known.str.contains(",", regex=False)
@@ -198,6 +209,23 @@ def _numbers(name: str, column: Any) -> Any:
         return _refuse_commas(name, known)
     made = pd.to_numeric(known.str.replace(",", ".", regex=False), errors="coerce")
     return words if made.isna().any() else made.reindex(column.index).to_numpy(dtype=np.float64)
+
+
+def _refuse_points(
+    columns: dict[int, Any], table: list[Any], names: list[str], rows: list[list[str]]
+) -> None:
+    """Refuse points that seem to separate thousands: 1.234 among 567, or next to decimal commas."""
+    commas = any(table[i].dtype.kind == "O" and isinstance(columns[i], np.ndarray) for i in columns)
+    for i, values in columns.items():
+        if table[i].dtype.kind != "f" or ((values != 0.0) & (np.abs(values) < 1.0)).any():
+            continue
+        cells = [row[i].strip() for row in rows if i < len(row) and _number(row[i])]
+        pointed = [cell for cell in cells if "." in cell]
+        if (pointed and (commas or len(pointed) < len(cells))
+                and all(re.fullmatch(r"[-+]?[1-9]\d{0,2}\.\d{3}", cell) for cell in pointed)
+                and not any(re.fullmatch(r"[-+]?\d{4,}", cell) for cell in cells)):  # fmt: skip
+            raise BadInput(f"column {names[i]}: {pointed[0]!r}: does the point separate thousands? "
+                           "write numbers without separators of thousands")  # fmt: skip
 
 
 def _refuse_commas(name: str, known: Any) -> Any:
@@ -218,8 +246,9 @@ def _time(
         return found[0], f"times: column {choice.time}"
     first, note = next(iter(columns)), ""
     if named:
-        likely = [i for i in columns if TIME.search(names[i]) or (i == first and not names[i])]
-        likely = [i for i in likely if names[i] or not is_counter(columns[i])]
+        likely = [i for i in columns if TIME.search(names[i])]
+        if not names[first] and not is_counter(columns[first]):
+            likely.append(first)
         likely += [i for i in columns if not likely and not isinstance(columns[i], np.ndarray)]
         found = [i for i in likely if _may_rise(columns[i], names[i])] or [
             i for i in likely if TIME.search(names[i])]  # fmt: skip
@@ -227,6 +256,12 @@ def _time(
     else:
         rises = len(columns) > 1 and not is_counter(columns[first])
         found = [first] if rises and _may_rise(columns[first], names[first]) else []
+        also = [i for i in columns if found and i != first and isinstance(columns[i], np.ndarray)
+                and goes_with(columns[i], None)]  # fmt: skip
+        if also and isinstance(columns[first], np.ndarray):
+            raise BadInput(f"columns {names[first]} and {names[also[0]]} rise as evenly as times "
+                           f"do: --time {names[also[0]]} --drop {names[first]}, or the other way "
+                           "round, says which are the times")  # fmt: skip
         note = "times: the first column, which rises throughout"
     if found and choice.no_times:
         raise BadInput(f"column {names[found[0]]} holds times: leave --step out, or --drop "
@@ -236,16 +271,28 @@ def _time(
 
 def _may_rise(values: Any, name: str) -> bool:
     try:
-        t = _times(values, name)[0]
+        t = _times(values, name).t
     except BadInput:
         return False
     return bool((np.diff(t) > 0.0).all())
 
 
-def _times(values: Any, name: str) -> tuple[Array, list[str]]:
-    """Return times, dates in seconds since the first, and notes."""
+def _is_day_of(values: Any, clock: Any) -> bool:
+    """Whether a column holds the dates of another that holds the times of day."""
+    words = clock is not None and not any(isinstance(one, np.ndarray) for one in (values, clock))
+    return words and is_clock(clock) and is_date(values)
+
+
+def _on_day(columns: dict[int, Any], time: int, day: int | None) -> Any:
+    if day is None:
+        return columns[time]
+    return columns[day].astype(str).str.strip() + " " + columns[time].astype(str).str.strip()
+
+
+def _times(values: Any, name: str) -> Times:
+    """Return times, dates in seconds since the first."""
     if isinstance(values, np.ndarray):
-        return compact_dates(values) or (values, [])
+        return of_numbers(values)
     if values.isna().any():
         raise BadInput(f"column {name}: time {int(values.isna().argmax())} (from 0) is missing")
     return seconds_of(values.astype(str).str.strip(), name)

@@ -118,7 +118,7 @@ def test_other_sampling_is_brought_to_the_step_of_the_atlas(
     found = as_json(sweep, "half.npz", "--atlas", folder)
     assert (found["step"], found["recorded_step"]) == (0.1, pytest.approx(0.2))
     assert any("interpolated (recorded at 0.2)" in note for note in found["notes"])
-    assert any("samples a period" in warning for warning in found["warnings"])
+    assert any("samples per period" in warning for warning in found["warnings"])
 
 
 def test_recording_outside_the_atlas_has_no_class_but_a_nearest(
@@ -244,7 +244,7 @@ def test_recording_that_stands_still_is_steady(sweep: Sweep):
         (("--bridge", "-1"), "allowed is 0 or more"),
         (("--factors", "2"), "T,U is needed, two numbers, T above 0"),
         (("--factors", "0,1"), "T,U is needed, two numbers, T above 0"),
-        (("--lowpass", "60"), "60 a unit of time is not between 0 and half"),
+        (("--lowpass", "60"), "60 per unit of time is not between 0 and half"),
         (("--variable", "v"), "--variable v: the file has t, u"),
         (("--select", "point"), "NAME=INDEX is needed"),
         (("--atlas", "nowhere"), "nowhere"),
