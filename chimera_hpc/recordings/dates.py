@@ -132,7 +132,9 @@ def _clock(words: Any, name: str, dated: bool) -> Times:
         t = days.fillna(0.0) * _DAY + hours * _HOUR + second * 60 + third.fillna(0.0) + fraction
         how, period = "times of day hh:mm:ss", _DAY
         wrong = (second >= 60.0) | (third >= 60.0) | ((first >= 24.0) & (days.notna() | dated))
-    elif third.isna().all() and (parts[4].notna().any() or first.max() >= 24):
+    elif third.isna().all() and (
+        parts[4].notna().any() or first.max() >= 24 or _says(name, r"m+:s")
+    ):
         t, how, period = first * 60 + second + fraction, "times mm:ss", _HOUR
         wrong = second >= 60.0
         if parts[4].isna().all() and not _says(name, r"m+:s") and not (first.diff() < -30.0).any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,11 @@ def clock(t: float) -> str:
         table([clock(t) for t in T], ["time", *NAMES]),
         table([f"01.02.2023 00:{clock(t)}" for t in T], ["time", *NAMES]),
         table([f"2023-02-01T00:{clock(t)}+02:00" for t in T], ["time", *NAMES]),
+        table([f"2023-02-01 00:{clock(t)} UTC" for t in T], ["time", *NAMES]),
+        table([f"0 days 00:{clock(t)}" for t in T], ["time", *NAMES]),
+        table([f"2023020100{clock(t)}".replace(":", "") for t in T], ["time", *NAMES]),
+        table([f"01.02.2023;00:{clock(t)}" for t in T], ["Datum", "Zeit", *NAMES], ";"),
+        table([f"{2 * i},{t}" for i, t in enumerate(TIMES)], ["", "time", *NAMES]),
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
@@ -140,3 +146,111 @@ def test_cell_with_a_hash_is_missing_and_cuts_nothing(tmp_path: Path):
     text[700] = ",".join([TIMES[699], "#N/A", *text[700].split(",")[2:]])
     (tmp_path / "u.csv").write_text("\n".join(text))
     assert np.isnan(read_recording(tmp_path / "u.csv", Choice()).u).sum() == 1
+
+
+def read_times(times: list[str], name: str, tmp_path: Path) -> Recording:
+    rows = [f"{t};{i % 7};{i * i % 5}" for i, t in enumerate(times)]
+    (tmp_path / "u.csv").write_text("\n".join([f"{name};a;b", *rows]))
+    return read_recording(tmp_path / "u.csv", Choice())
+
+
+@pytest.mark.parametrize(
+    ("times", "name", "seconds"),
+    [
+        (["202601312358", "202601312359", "202602010000"], "time", [0, 60, 120]),
+        (["20260131235959500", "20260201000000000"], "time", [0, 0.5]),
+        (["01-2026-31", "02-2026-01", "02-2026-02"], "time", [0, 86400, 172800]),
+        (["26.01.31", "26.02.01", "26.02.02"], "time", [0, 86400, 172800]),
+        (["30:00", "30:01", "30:02"], "time hh:mm", [0, 60, 120]),
+        (["00:01", "00:02"], "time mm:ss", [0, 1]),
+    ],
+)
+def test_forms_of_dates(times: list[str], name: str, seconds: list[float], tmp_path: Path):
+    found = read_times(times, name, tmp_path)
+    assert found.t == pytest.approx(seconds)
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        (["30:00", "30:01", "30:02"], "'30:02' was taken for mm:ss; if it is hh:mm"),
+        (["1675209600000", "1675209600020"], "milliseconds since 1970.* --factors 0.001,1"),
+        (["1675209600000000000", "1675209600020000000"], "nanoseconds since 1970"),
+    ],
+)
+def test_doubtful_units_of_time_are_warned_of(times: list[str], said: str, tmp_path: Path):
+    (line,) = read_times(times, "time", tmp_path).warnings
+    assert re.search(said, line)
+
+
+@pytest.mark.parametrize("time", ["00:00:98", "24:00:00x", "2026-01-31 25:00:00"])
+def test_impossible_times_are_refused(time: str, tmp_path: Path):
+    with pytest.raises(BadInput, match="is no time"):
+        read_times([time, time], "time", tmp_path)
+
+
+@pytest.mark.parametrize("first", ["0,02", "2"])
+def test_points_that_separate_thousands_are_refused(first: str, tmp_path: Path):
+    rows = [f"{first};1.500;628", "3;7;-7", "4;2.250;9"]
+    (tmp_path / "u.csv").write_text("\n".join(["time;a;b", *rows]))
+    with pytest.raises(BadInput, match=r"column a: '1.500': does the point separate thousands"):
+        read_recording(tmp_path / "u.csv", Choice())
+
+
+def test_two_columns_of_times_without_names_are_refused(tmp_path: Path):
+    text = table([f"{2 * i},{t}" for i, t in enumerate(TIMES)], [])
+    (tmp_path / "u.csv").write_text(text.lstrip("\n"))
+    with pytest.raises(BadInput, match="columns 0 and 1 rise as evenly as times do: --time 1"):
+        read_recording(tmp_path / "u.csv", Choice())
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        (T / 10 + 0.01 * np.sin(37 * T), "fewer than 1.5 turns in a window"),
+        (np.cos(2 * np.pi * T) + T, "fewer than 1.5 turns in a window"),
+        (np.where(np.arange(1501) == 700, 1e6, U[:, 3]), "a sine holds less than 30%"),
+        (np.clip(U[:, 3], -0.5, 0.5), "keeps its value in many steps"),
+        ((np.arange(1501) % 100 < 3).astype(float), "keeps its value in many steps"),
+    ],
+)
+def test_node_that_is_no_oscillator_is_named(column: np.ndarray, said: str):
+    u = U.copy()
+    u[:, 3] = column
+    made = prepare(Recording(T, u), None)
+    found = measure(made, Features(), True, None)
+    lines = [line for line in (*made.warnings, *found.warnings) if line.startswith("node 3:")]
+    assert any(said in line and "--drop 3" in line for line in lines)
+
+
+def test_faint_signals_on_a_high_level_are_measured_and_said():
+    made = prepare(Recording(T, 1e6 + U), None)
+    found = measure(made, Features(), True, None)
+    assert found.features.amplitude == pytest.approx(np.ones(8), rel=0.02)
+    assert any("round a level of 1e+06" in line for line in found.warnings)
+
+
+def test_short_slopes_are_nodes():
+    recording = with_times(Recording(T[:15], U[:15]), None)
+    assert recording.u.shape == (15, 8)
+
+
+def test_signals_out_of_range_and_endless_filters_are_refused():
+    for factor in (1e200, 1e-200):
+        with pytest.raises(BadInput, match="leave the range of numbers"):
+            prepare(Recording(T, factor * U), None)
+    with pytest.raises(BadInput, match="--lowpass: 1e-09 per unit of time is too low"):
+        prepare(Recording(T, U), None, lowpass=1e-9)
+
+
+def test_structure_of_matlab_is_looked_into(tmp_path: Path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "u.mat", {"EEG": {"data": U.T, "times": T, "srate": 50.0}})
+    assert measured(tmp_path / "u.mat").features.frequency == pytest.approx(np.ones(8), rel=0.01)
+
+
+def test_order_is_read_from_a_file_with_a_byte_order_mark(tmp_path: Path):
+    (tmp_path / "order.txt").write_text("3\n1\n0\n", encoding="utf-16")
+    assert in_order(Recording(T, U), str(tmp_path / "order.txt")).names == ("3", "1", "0")
