@@ -181,9 +181,7 @@ def _draw(
         settings = store.sweep.features
         data, text = window_spectrum(focus.t, focus.u, settings, node, window)
         print(text)
-        figures[f"spectrum{at_node}{at_window}"] = spectrum(
-            data, f"node {node}, window {window}"
-        )
+        figures[f"spectrum{at_node}{at_window}"] = spectrum(data, f"node {node}, window {window}")
     with errors_in_one_line(folder):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]
