@@ -1,8 +1,8 @@
-"""The faults: each is one function of a trial that does the harm and lets the sweep recover.
+"""The table of faults: what is run, what is done to it, how it must end, what may be lost.
 
-For developers: a fault is a function with one line of text, in `FAULTS`; it returns
-`trial.finding(allowed)`, where `allowed` is how many points may be computed again: a block for each
-process that was killed or stopped, and each damaged block.
+For developers: a fault is a row of `TABLE`. `allowed` is how many points may be computed again: a
+block for each process that was killed or stopped, and each damaged block. What fits into no kind of
+row is a `Story`, a function of a trial that returns `trial.finding(allowed)`.
 """
 
 from __future__ import annotations
@@ -17,120 +17,137 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lab import BLOCK, LOCAL, N_BLOCKS, PATIENCE, SERIAL, Child, Finding, Point, Trial
 
-Fault = Callable[[Trial], Finding]
-FAULTS: dict[str, Fault] = {}
 BROKEN: Point = (3, 5)
 """The point that is made to fail."""
+PLACES: tuple[str, ...] = ()
+"""Stands for `Trial.places`: worker processes and the driver's own, by turns."""
 
 
 class Impossible(RuntimeError):
     """This machine, or this user, does not allow the fault."""
 
 
-def fault(name: str) -> Callable[[Fault], Fault]:
-    """Register a fault."""
+@dataclass(frozen=True)
+class Strike:
+    """Something happens to a run at a random moment."""
 
-    def register(function: Fault) -> Fault:
-        FAULTS[name] = function
-        return function
+    name: str
+    options: tuple[str, ...]
+    """Of the run."""
+    action: Callable[[Trial, Child], object]
+    exits: int | tuple[int, ...]
+    """Exit statuses that it may have."""
+    allowed: int
 
-    return register
+    def __call__(self, trial: Trial) -> Finding:
+        child = trial.start_run(*(self.options or trial.places))
+        trial.wait_for_a_moment(child)
+        self.action(trial, child)
+        trial.ended(child, self.exits)
+        trial.resume()
+        return trial.finding(self.allowed)
 
 
-# Processes that die
+@dataclass(frozen=True)
+class Surroundings:
+    """A run has a machine about it that lacks something."""
+
+    name: str
+    options: tuple[str, ...]
+    around: Callable[[Trial], contextlib.AbstractContextManager[dict[str, str]]]
+    """What is wrong while it runs; gives its environment."""
+
+    def __call__(self, trial: Trial) -> Finding:
+        with self.around(trial) as environment:
+            child = trial.start_run(*self.options, **environment)
+            trial.ended(child, 0)
+        trial.resume()
+        return trial.finding(0)
 
 
-@fault("kill -9 of a worker")
-def kill_worker(trial: Trial) -> Finding:
-    child = trial.start_run(*LOCAL)
-    trial.wait_for_a_moment(child)
+@dataclass(frozen=True)
+class Culprit:
+    """One point misbehaves, and must be the only one that fails."""
+
+    name: str
+    kind: str
+    """See `trouble`."""
+    options: tuple[str, ...] = SERIAL
+    deaths: int = 0
+    """Processes that it takes with it."""
+    said: str = ""
+    """In the list of failures."""
+
+    def __call__(self, trial: Trial) -> Finding:
+        trouble = f"{self.kind}:{BROKEN[0]}:{BROKEN[1]}"
+        child = trial.start_run(*(self.options or trial.places), TROUBLE=trouble)
+        trial.ended(child, 1)
+        trial.expect_failures(child.text(), BROKEN)
+        if self.said not in child.text():
+            trial.problems.append(f"not said to be {self.said}")
+        sets = [w for w in self.options if w.startswith(("--set", "integrator.", "run."))]
+        text = trial.resume(*sets, expect=1, TROUBLE=trouble)
+        trial.expect_failures(text, BROKEN)
+        return trial.finding(self.deaths * BLOCK, broken=(BROKEN,))
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Something happens to the store of a sweep that is done."""
+
+    name: str
+    action: Callable[[Trial], object]
+    allowed: int
+
+    def __call__(self, trial: Trial) -> Finding:
+        _copy_reference(trial)
+        self.action(trial)
+        trial.resume()
+        return trial.finding(self.allowed, was_whole=True)
+
+
+@dataclass(frozen=True)
+class Story:
+    """Anything else."""
+
+    name: str
+    action: Callable[[Trial], Finding]
+
+    def __call__(self, trial: Trial) -> Finding:
+        return self.action(trial)
+
+
+def _kill_a_worker(trial: Trial, child: Child) -> None:
     _kill(trial.random.sample(child.workers(), min(1, len(child.workers()))))
-    trial.ended(child, 0)
-    trial.resume()
-    return trial.finding(BLOCK)
 
 
-@fault("kill -9 of all workers")
-def kill_all_workers(trial: Trial) -> Finding:
-    child = trial.start_run(*LOCAL)
-    trial.wait_for_a_moment(child)
-    _kill(child.workers())
-    trial.ended(child, 0)
-    trial.resume()
-    return trial.finding(2 * BLOCK)
-
-
-@fault("kill -9 of the driver")
-def kill_driver(trial: Trial) -> Finding:
-    child = trial.start_run(*trial.places)
-    trial.wait_for_a_moment(child)
-    child.signal(signal.SIGKILL)
-    trial.ended(child, (-9, 0))
-    trial.resume()
-    return trial.finding(2 * BLOCK)
-
-
-@fault("SIGTERM")
-def terminate(trial: Trial) -> Finding:
-    child = trial.start_run(*trial.places)
-    trial.wait_for_a_moment(child)
-    child.signal(signal.SIGTERM)
-    trial.ended(child, (75, 0))
-    trial.resume()
-    return trial.finding(2 * BLOCK)
-
-
-@fault("Ctrl-C once")
-def interrupt(trial: Trial) -> Finding:
-    child = trial.start_run(*trial.places)
-    trial.wait_for_a_moment(child)
-    child.signal_group(signal.SIGINT)
-    trial.ended(child, (130, 0))
-    trial.resume()
-    return trial.finding(2 * BLOCK)
-
-
-@fault("Ctrl-C twice")
-def interrupt_twice(trial: Trial) -> Finding:
-    child = trial.start_run(*trial.places)
-    trial.wait_for_a_moment(child)
+def _interrupt_twice(trial: Trial, child: Child) -> None:
     child.signal_group(signal.SIGINT)
     time.sleep(trial.random.uniform(0, 0.1))
     child.signal_group(signal.SIGINT)
-    trial.ended(child, (130, 0))
-    trial.resume()
-    return trial.finding(2 * BLOCK)
 
 
-@fault("SIGSTOP of a worker, for ever")
-def hang_worker(trial: Trial) -> Finding:
-    child = trial.start_run(*LOCAL)
-    trial.wait_for_a_moment(child)
-    _signal(child.workers()[:1], signal.SIGSTOP)
-    trial.ended(child, 0)
-    trial.resume()
-    return trial.finding(BLOCK)
-
-
-@fault("SIGSTOP of a worker, late awakening")
-def hang_worker_for_a_while(trial: Trial) -> Finding:
-    child = trial.start_run(*LOCAL)
-    trial.wait_for_a_moment(child)
+def _stop_a_worker_for_a_while(trial: Trial, child: Child) -> None:
     worker = child.workers()[:1]
     _signal(worker, signal.SIGSTOP)
     time.sleep(trial.random.uniform(0, 2 * PATIENCE))
     _signal(worker, signal.SIGCONT)
-    trial.ended(child, 0)
-    trial.resume()
-    return trial.finding(BLOCK)
 
 
-@fault("SIGSTOP of a driver, late awakening")
+def _sent(number: int) -> Callable[[Trial, Child], object]:
+    return lambda _, run: run.signal(number)
+
+
+def _sent_to_all(number: int) -> Callable[[Trial, Child], object]:
+    return lambda _, run: run.signal_group(number)
+
+
 def hang_driver_for_a_while(trial: Trial) -> Finding:
     first = trial.start_run(*SERIAL)
     trial.wait_for_a_moment(first)
@@ -143,7 +160,6 @@ def hang_driver_for_a_while(trial: Trial) -> Finding:
     return trial.finding(BLOCK)
 
 
-@fault("two drivers at once")
 def two_drivers(trial: Trial) -> Finding:
     drivers = [trial.start_run(*SERIAL)]
     time.sleep(trial.random.uniform(0, 0.5))
@@ -154,7 +170,41 @@ def two_drivers(trial: Trial) -> Finding:
     return trial.finding(0)
 
 
-@fault("kill -9 of the scheduler")
+def skewed_clocks(trial: Trial) -> Finding:
+    drivers = [
+        trial.start_run(*options, SKEW=skew)
+        for options, skew in ((LOCAL, "0"), (SERIAL, "3700"), (SERIAL, "-3700"))
+    ]
+    for driver in drivers:
+        trial.ended(driver, 0)
+    trial.resume(SKEW="3700")
+    return trial.finding(0)
+
+
+@contextmanager
+def _full_tmp(trial: Trial) -> Iterator[dict[str, str]]:
+    """Have a temporary folder without room for a byte."""
+    folder = trial.folder / "tmp"
+    with _mounted(folder, "-t", "tmpfs", "-o", "size=64k", "tmpfs"):
+        with contextlib.suppress(OSError), (folder / "ballast").open("wb", buffering=0) as file:
+            while True:
+                file.write(bytes(4096))
+        yield {"TMPDIR": str(folder), "FRESH": "1"}
+
+
+@contextmanager
+def _read_only_home(trial: Trial) -> Iterator[dict[str, str]]:
+    """Have a home where nothing can be written, and no other place for compiled kernels."""
+    folder = trial.folder / "home"
+    with _mounted(folder, "-t", "tmpfs", "-o", "ro", "tmpfs"):
+        places = ("XDG_CACHE_HOME", "XDG_CONFIG_HOME", "NUMBA_CACHE_DIR", "MPLCONFIGDIR")
+        # All trials share the stand-in for the kernels, as all runs of a machine do.
+        shared = trial.folder.parent / "stand-in"
+        shared.mkdir(exist_ok=True)
+        empty = dict.fromkeys(places, "")
+        yield {"HOME": str(folder), "TMPDIR": str(shared), "FRESH": "1", **empty}
+
+
 def kill_scheduler(trial: Trial) -> Finding:
     file = trial.folder / "scheduler.json"
     with _scheduler(trial, file) as first:
@@ -172,51 +222,26 @@ def kill_scheduler(trial: Trial) -> Finding:
     return trial.finding(2 * BLOCK)
 
 
-# Points that misbehave
+def _cut_short(trial: Trial) -> None:
+    chunk = _some_chunk(trial)
+    os.truncate(chunk, trial.random.randrange(chunk.stat().st_size))
 
 
-@fault("a point that never ends")
-def never_ends(trial: Trial) -> Finding:
-    return _misbehave(trial, "forever", "integrator.time_out=3")
+def _flip_a_byte(trial: Trial) -> None:
+    chunk = _some_chunk(trial)
+    _flip(trial, chunk)
+    text = trial.run("verify", trial.out, "--stored", "--forget", expect=1)
+    if chunk.parent.name not in text:
+        trial.problems.append(f"{chunk} not named: {text}")
 
 
-@fault("a point that blows up")
-def blows_up(trial: Trial) -> Finding:
-    return _misbehave(trial, "blow-up")
-
-
-@fault("a point that kills its worker every time")
-def kills_its_worker(trial: Trial) -> Finding:
-    # Twice with its block, twice alone.
-    return _misbehave(trial, "kill", deaths=4)
-
-
-@fault("a point that needs more memory than there is")
-def hits_memory_limit(trial: Trial) -> Finding:
-    # Once with its block, twice alone.
-    return _misbehave(trial, "memory", options=("--mem", "700M"), deaths=3)
-
-
-def _misbehave(
-    trial: Trial, kind: str, *settings: str, options: tuple[str, ...] = (), deaths: int = 0
-) -> Finding:
-    trouble = f"{kind}:{BROKEN[0]}:{BROKEN[1]}"
-    sets = [word for setting in settings for word in ("--set", setting)]
-    child = trial.start_run(*(LOCAL if deaths else SERIAL), *options, *sets, TROUBLE=trouble)
-    trial.ended(child, 1)
-    trial.expect_failures(child.text(), BROKEN)
-    status = {"kill": "worker lost", "memory": "out of memory"}.get(kind, "")
-    if status not in child.text():
-        trial.problems.append(f"not said to be {status}")
-    text = trial.resume(*sets, expect=1, TROUBLE=trouble)
-    trial.expect_failures(text, BROKEN)
-    return trial.finding(deaths * BLOCK, broken=(BROKEN,))
+def _lose_a_ledger_chunk(trial: Trial) -> None:
+    (trial.store / "ledger" / f"c.{trial.random.randrange(N_BLOCKS)}.0").unlink()
 
 
 # Disks
 
 
-@fault("disk full")
 def disk_full(trial: Trial) -> Finding:
     with _mounted(trial.out, "-t", "tmpfs", "-o", "size=8m", "tmpfs"):
         child = trial.start_run(*trial.places)
@@ -233,7 +258,6 @@ def disk_full(trial: Trial) -> Finding:
         return trial.finding(2 * BLOCK)
 
 
-@fault("store read-only half-way")
 def read_only(trial: Trial) -> Finding:
     child = trial.start_run(*trial.places)
     trial.wait_for(trial.blocks_done, child)
@@ -253,36 +277,6 @@ def read_only(trial: Trial) -> Finding:
 # Damage
 
 
-@fault("a chunk cut short")
-def truncated(trial: Trial) -> Finding:
-    _copy_reference(trial)
-    chunk = _some_chunk(trial)
-    os.truncate(chunk, trial.random.randrange(chunk.stat().st_size))
-    trial.resume()
-    return trial.finding(BLOCK, was_whole=True)
-
-
-@fault("a byte flipped")
-def flipped(trial: Trial) -> Finding:
-    _copy_reference(trial)
-    chunk = _some_chunk(trial)
-    _flip(trial, chunk)
-    text = trial.run("verify", trial.out, "--stored", "--forget", expect=1)
-    if chunk.parent.name not in text:
-        trial.problems.append(f"{chunk} not named: {text}")
-    trial.resume()
-    return trial.finding(BLOCK, was_whole=True)
-
-
-@fault("a ledger chunk lost")
-def ledger_lost(trial: Trial) -> Finding:
-    _copy_reference(trial)
-    (trial.store / "ledger" / f"c.{trial.random.randrange(N_BLOCKS)}.0").unlink()
-    trial.resume()
-    return trial.finding(BLOCK, was_whole=True)
-
-
-@fault("partial files left over")
 def left_over(trial: Trial) -> Finding:
     child = trial.start_run(*SERIAL)
     trial.wait_for_a_moment(child)
@@ -296,7 +290,6 @@ def left_over(trial: Trial) -> Finding:
     return trial.finding(BLOCK)
 
 
-@fault("attributes damaged")
 def attributes_damaged(trial: Trial) -> Finding:
     _copy_reference(trial)
     files = [trial.store / "zarr.json"] * 3
@@ -321,7 +314,6 @@ def attributes_damaged(trial: Trial) -> Finding:
 # Kills in the middle of other commands
 
 
-@fault("kill -9 during plan")
 def kill_plan(trial: Trial) -> Finding:
     child = trial.start_run(*SERIAL)
     folder = trial.wait_for(lambda: list(trial.folder.glob("sweep/.store*")), child)
@@ -332,7 +324,6 @@ def kill_plan(trial: Trial) -> Finding:
     return trial.finding(BLOCK)
 
 
-@fault("kill -9 during extend")
 def kill_extend(trial: Trial) -> Finding:
     trial.resume("--set", "seeds=6")
     extend = ("extend", trial.job, "--out", trial.out)
@@ -347,7 +338,6 @@ def kill_extend(trial: Trial) -> Finding:
     return trial.finding(0)
 
 
-@fault("kill -9 during merge")
 def kill_merge(trial: Trial) -> Finding:
     parts = []
     for name, seeds in (("first", "[0,1,2,3,4]"), ("second", "[3,4,5,6,7]")):
@@ -367,7 +357,6 @@ def kill_merge(trial: Trial) -> Finding:
     return trial.finding(0)
 
 
-@fault("kill -9 during reduce")
 def kill_reduce(trial: Trial) -> Finding:
     _copy_reference(trial)
     wanted = (trial.out / "results.json").read_bytes()
@@ -487,3 +476,50 @@ def _scheduler(trial: Trial, file: Path) -> Iterator[list[subprocess.Popen[bytes
             process.kill()
             process.wait()
         log.close()
+
+
+_HANG = (*("--set", "integrator.time_out=3"), *("--set", "run.patience=5"))
+TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
+    # Processes that die
+    Strike("kill -9 of a worker", LOCAL, _kill_a_worker, 0, BLOCK),
+    Strike("kill -9 of all workers", LOCAL, lambda _, run: _kill(run.workers()), 0, 2 * BLOCK),
+    Strike("kill -9 of the driver", PLACES, _sent(signal.SIGKILL), (-9, 0), 2 * BLOCK),
+    Strike("SIGTERM", PLACES, _sent(signal.SIGTERM), (75, 0), 2 * BLOCK),
+    Strike("Ctrl-C once", PLACES, _sent_to_all(signal.SIGINT), (130, 0), 2 * BLOCK),
+    Strike("Ctrl-C twice", PLACES, _interrupt_twice, (130, 0), 2 * BLOCK),
+    Strike("SIGSTOP of a worker, for ever", LOCAL,
+           lambda _, run: _signal(run.workers()[:1], signal.SIGSTOP), 0, BLOCK),
+    Strike("SIGSTOP of a worker, late awakening", LOCAL, _stop_a_worker_for_a_while, 0, BLOCK),
+    Story("SIGSTOP of a driver, late awakening", hang_driver_for_a_while),
+    Story("two drivers at once", two_drivers),
+    Story("three drivers, their clocks an hour apart", skewed_clocks),
+    Story("kill -9 of the scheduler", kill_scheduler),
+    # Points that misbehave
+    Culprit("a point that never ends", "forever", (*SERIAL, "--set", "integrator.time_out=3")),
+    Culprit("a point that blows up", "blow-up"),
+    # Twice with its block, twice alone; or once with its block, and once or twice alone.
+    Culprit("a point that kills its worker every time", "kill", LOCAL, 4, "worker lost"),
+    Culprit("a point that needs more memory than there is", "memory",
+            (*LOCAL, "--mem", "700M"), 3, "out of memory"),
+    Culprit("a right-hand side that never returns, in a worker", "hang", (*LOCAL, *_HANG), 2,
+            "time-out: the model did not return"),
+    Culprit("a right-hand side that never returns, in one process", "hang", (*SERIAL, *_HANG), 2,
+            "time-out: the model did not return"),
+    # Disks
+    Story("disk full", disk_full),
+    Story("store read-only half-way", read_only),
+    Surroundings("full /tmp", LOCAL, _full_tmp),
+    Surroundings("read-only home", LOCAL, _read_only_home),
+    # Damage
+    Damage("a chunk cut short", _cut_short, BLOCK),
+    Damage("a byte flipped", _flip_a_byte, BLOCK),
+    Damage("a ledger chunk lost", _lose_a_ledger_chunk, BLOCK),
+    Story("partial files left over", left_over),
+    Story("attributes damaged", attributes_damaged),
+    # Kills in the middle of other commands
+    Story("kill -9 during plan", kill_plan),
+    Story("kill -9 during extend", kill_extend),
+    Story("kill -9 during merge", kill_merge),
+    Story("kill -9 during reduce", kill_reduce),
+)  # fmt: skip
+FAULTS = {row.name: row for row in TABLE}

@@ -267,10 +267,18 @@ LOCAL = ("--cluster", "local", "--workers", "2")
 
 def command(arguments: Iterator[str]) -> int:
     """Run a command line in this process."""
+    program = [sys.executable, "-m", "chimera_hpc.sweep", *arguments]
+    if os.environ.pop("FRESH", ""):
+        # Nothing is imported or compiled yet, and the folders are those of the environment.
+        for name in [name for name, value in os.environ.items() if not value]:
+            del os.environ[name]
+        os.execv(sys.executable, program)
     from chimera_hpc.sweep import main
 
-    sys.argv = ["sweep", *arguments]
-    return int(main())
+    ahead, now = float(os.environ.get("SKEW", "0")), time.time
+    if ahead:
+        time.time = lambda: now() + ahead
+    return int(main(program[3:], program))
 
 
 def fork(work: Callable[[], int], output: Path, environment: dict[str, str]) -> int:
