@@ -142,7 +142,9 @@ class Features(Table):
         "window", description="Time at which a phase is read: the window's start, or 0."
     )
     steady_threshold: float = Field(
-        1e-2, ge=0, description="Mean standard deviation of u below which a run is steady."
+        1e-2,
+        ge=0,
+        description="Mean standard deviation, in the unit of u, below which a run is steady.",
     )
     groups: int = Field(
         6,

@@ -11,6 +11,11 @@ from chimera_hpc.base.errors import BadInput
 
 Array = NDArray[np.float64]
 
+_SECONDS = {
+    "M": ': pass seconds, (t - t[0]) / np.timedelta64(1, "s")',
+    "m": ': pass seconds, t / np.timedelta64(1, "s")',
+}
+
 
 def floats(name: str, values: ArrayLike) -> Array:
     """Return values of any shape as float64.
@@ -18,14 +23,15 @@ def floats(name: str, values: ArrayLike) -> Array:
     Raises BadInput: the values are not real numbers (complex, dates, words), some are masked, or
     the rows differ in length.
     """
-    if np.ma.is_masked(values):
+    parts = values if isinstance(values, list | tuple) else [values]
+    if any(np.ma.is_masked(part) for part in parts):
         raise BadInput(f"{name} holds masked values: interpolate them or leave them out")
     kind = ""
     try:
         array = np.asarray(values)
         if array.dtype.kind in "biufO":
             return np.asarray(array, dtype=np.float64)
-        kind = f", not {array.dtype}"
+        kind = f", not {array.dtype}" + _SECONDS.get(array.dtype.kind, "")
     except (TypeError, ValueError):
         pass  # rows of several lengths, or objects that are no numbers
     raise BadInput(f"{name} must be an array of real numbers{kind}")

@@ -18,6 +18,7 @@ tells how far a signal is a sine: 1 for a sine, 0 for white noise.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
@@ -30,8 +31,15 @@ from chimera_hpc.base.renaming import accepts_old_names
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
-from chimera_hpc.measures.checks import Array, choice
-from chimera_hpc.measures.recording import check_node, check_threshold, check_windows, recording
+from chimera_hpc.measures.checks import Array, choice, node_rows
+from chimera_hpc.measures.recording import (
+    check_node,
+    check_threshold,
+    check_windows,
+    recording,
+    suspect_signals,
+    suspect_steadiness,
+)
 
 WindowReference = Literal["ring", "own"]
 PhaseMean = Literal["circular", "arithmetic"]
@@ -155,7 +163,14 @@ def fourier_features(
     Raises
     ------
     BadInput
-        A wrong shape or option, times that are not uniform, or a value that is not finite.
+        A wrong shape or option, times that are not uniform, or values that are not real, not finite
+        or masked.
+
+    Warns
+    -----
+    UserWarning
+        A signal is constant among others or rises throughout, the axes of u seem to be swapped, or
+        a run is steady by `steady_threshold` only.
 
     Examples
     --------
@@ -170,18 +185,33 @@ def fourier_features(
     >>> f.n_windows, f.status.name
     (3, 'DONE')
     """
-    choice("phase_mean", phase_mean, get_args(PhaseMean))
-    found = window_lines(
+    features = measure_signals(
         t,
         u,
         n_peaks=n_peaks,
         n_overlap=n_overlap,
         window_reference=window_reference,
         reference_node=reference_node,
+        phase_mean=phase_mean,
         refine=refine,
         time_origin=time_origin,
         steady_threshold=steady_threshold,
     )
+    rows = node_rows("u", u)
+    suspect = suspect_signals(rows)
+    if features.status is Status.STEADY:
+        suspect += suspect_steadiness(rows, features.deviation, steady_threshold)
+    for line in suspect:
+        warnings.warn(f"fourier_features: {line}", UserWarning, stacklevel=3)
+    return features
+
+
+def measure_signals(
+    t: ArrayLike, u: ArrayLike, *, phase_mean: PhaseMean = "circular", **options: Any
+) -> FourierFeatures:
+    """Do as `fourier_features`, without a look at what the signals are."""
+    choice("phase_mean", phase_mean, get_args(PhaseMean))
+    found = window_lines(t, u, **options)
     out = np.full((len(FEATURES) + 1, found.amplitude.shape[0]), np.nan)
     n_windows = 0
     if found.status is Status.DONE:

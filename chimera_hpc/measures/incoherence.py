@@ -43,7 +43,7 @@ from numpy.typing import ArrayLike
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
-from chimera_hpc.measures.checks import Array, integer, node_rows
+from chimera_hpc.measures.checks import Array, floats, integer, node_rows
 
 # Times per chunk, so that their sums stay in the first-level cache.
 _CHUNK = 1024
@@ -63,7 +63,7 @@ def range_of(x: ArrayLike) -> float:
 
 def differences(x: ArrayLike) -> Array:
     """z_i = x_i - x_{i+1} around the ring, for x (..., N)."""
-    values = np.asarray(x, dtype=np.float64)
+    values = floats("x", x)
     return values - np.roll(values, -1, axis=-1)
 
 
@@ -237,8 +237,8 @@ def _finite(result: Any, what: str) -> Any:
 
 def _coherent(local: ArrayLike, delta: float | Array) -> Array:
     """Return s_m as 0.0 or 1.0. All s_m of a run with a NaN deviation are NaN."""
-    deviations = np.asarray(local, dtype=np.float64)
-    threshold = np.asarray(delta, dtype=np.float64)[..., None]
+    deviations = floats("local", local)
+    threshold = floats("delta", delta)[..., None]
     if deviations.ndim == 0 or deviations.shape[-1] == 0:
         raise BadInput(f"local must have shape (..., groups), not {deviations.shape}")
     if not (threshold >= 0).all():

@@ -6,13 +6,20 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.measures.checks import Array, floats, integer, node_rows
 
 # Largest distance of a time from the uniform grid, in steps.
 _UNIFORM = 1e-2
+# Factor between mean squares of steps along two axes from which the axes may be swapped.
+_SMOOTHER = 4.0
+# Standard deviation, in root mean squares of u, above which a steady run may be an oscillation.
+_SMALL = 1e-2
+_MOST_NAMED = 5
+# Fewest samples from which a signal without a turn is suspicious.
+_FEWEST = 20
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,46 @@ def recording(t: ArrayLike, u: ArrayLike) -> Recording:
             f"t must be uniform: a time is {departure:.3g} steps off, allowed is {_UNIFORM:g}"
         )
     return Recording(times, dt, rows)
+
+
+def suspect_signals(x: Array) -> list[str]:
+    """Return a line for each thing that makes signals x (N, T) look like none, with what to do."""
+    steps = np.diff(x, axis=1)
+    constant = (steps == 0.0).all(axis=1)
+    one_way = ((steps >= 0.0).all(axis=1) | (steps <= 0.0).all(axis=1)) & ~constant
+    lines = []
+    if constant.any() and not constant.all():
+        what = "never changes: its amplitude, frequency and phase count as 0"
+        lines.append(f"{_columns(constant)} {what}; leave it out if it is no oscillator")
+    if one_way.any() and x.shape[1] >= _FEWEST:
+        what = "rises or falls throughout: a time, a counter or a phase?"
+        lines.append(f"{_columns(one_way)} {what} Leave it out, or pass its sine")
+    along, across = np.mean(np.square(steps)), np.inf
+    if len(x) > 1:
+        across = np.mean(np.square(np.diff(x, axis=0)))
+    if len(x) >= x.shape[1] and across < along / _SMOOTHER:
+        lines.append(
+            f"u has {x.shape[1]} times of {len(x)} nodes and is smoother along the nodes: are its "
+            "axes swapped? Pass u.T"
+        )
+    return lines
+
+
+def suspect_steadiness(x: Array, deviation: float, threshold: float) -> list[str]:
+    """Return a line if an absolute threshold made signals x (N, T) steady that vary by much."""
+    if deviation < _SMALL * float(np.sqrt(np.mean(np.square(x)))) or deviation == 0.0:
+        return []
+    return [
+        f"steady: u varies by {deviation:.3g} (mean standard deviation), less than "
+        f"steady_threshold = {threshold:g}, which has the unit of u; if it oscillates, pass "
+        f"steady_threshold={0.01 * deviation:.0e}"
+    ]
+
+
+def _columns(which: NDArray[np.bool_]) -> str:
+    numbers = [str(i) for i in np.flatnonzero(which)[:_MOST_NAMED]]
+    more = ", ..." if np.count_nonzero(which) > _MOST_NAMED else ""
+    return f"column {', '.join(numbers)}{more} of u"
 
 
 def check_windows(n_peaks: int, n_overlap: int) -> tuple[int, int]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.measures.checks import floats
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,8 @@ def total_variation_arrays(
     Raises
     ------
     BadInput
-        Shapes that differ, or that are not (N,) with N >= 1; for a chain N >= 2.
+        Shapes that differ, or that are not (N,) with N >= 1; for a chain N >= 2; values that are
+        not real, or masked.
 
     Examples
     --------
@@ -64,7 +66,9 @@ def total_variation_arrays(
     >>> v  # (1/2 + 1/2 + 1) / 3, (2 + 1 + 1) / 3, (0 + 3 + 3) / 3
     (0.666667, 1.333333, 2.0)
     """
-    profiles = [np.asarray(x, dtype=np.float64) for x in (phase, amplitude, frequency)]
+    names = ("phase", "amplitude", "frequency")
+    given = zip(names, (phase, amplitude, frequency), strict=True)
+    profiles = [floats(name, x) for name, x in given]
     shapes = {x.shape for x in profiles}
     if len(shapes) > 1 or profiles[0].ndim != 1 or profiles[0].size == 0:
         raise BadInput(

@@ -14,7 +14,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.job.tables import Features
-from chimera_hpc.measures.fourier import FourierFeatures, fourier_features
+from chimera_hpc.measures.fourier import FourierFeatures, measure_signals
 from chimera_hpc.measures.quality import FEW_SAMPLES
 from chimera_hpc.measures.variation import total_variation_arrays
 from chimera_hpc.measures.windows import maxima
@@ -153,7 +153,7 @@ def features_of(
     """Return the Fourier features of a prepared recording; steady is relative unless told."""
     options = settings.options()
     limit = _FLAT * _size(made.u) if steady_threshold is None else steady_threshold
-    return fourier_features(made.t, made.u, **{**options, "steady_threshold": limit})
+    return measure_signals(made.t, made.u, **{**options, "steady_threshold": limit})
 
 
 def _size(u: Array) -> float:

@@ -19,7 +19,7 @@ from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.models import build
 from chimera_hpc.job.registry import measures, method
-from chimera_hpc.measures.fourier import FourierFeatures, fourier_features
+from chimera_hpc.measures.fourier import FourierFeatures, measure_signals
 from chimera_hpc.measures.measure import Measure, MeasuredRun
 from chimera_hpc.measures.quality import quality
 from chimera_hpc.measures.series import by_node, quantise, round_to
@@ -186,7 +186,7 @@ class _Block:
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
 
     def features(self, u: Array) -> FourierFeatures:
-        return fourier_features(self.times, u.T, **self.options)
+        return measure_signals(self.times, u.T, **self.options)
 
     def scalars(
         self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
@@ -235,7 +235,7 @@ def warm_up_features(sweep: Sweep, model: Model) -> None:
     t = 0.01 * np.arange(2000.0)
     rows = np.sin(2.0 * np.pi * t + np.arange(3.0)[:, None])
     spec = sweep.features
-    features = fourier_features(
+    features = measure_signals(
         t, rows.T, window_reference=spec.window_reference, refine=spec.refine
     )
     one_group = spec.model_copy(update={"groups": 1})

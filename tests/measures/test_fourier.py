@@ -166,6 +166,7 @@ def test_a_still_run_is_steady_however_many_tiny_maxima_it_has():
     assert np.isfinite(f.as_array()).all()
 
 
+@pytest.mark.filterwarnings("ignore:fourier_features:UserWarning")
 def test_the_limit_is_on_the_mean_over_nodes_of_the_deviation():
     u = np.concatenate([np.full((2001, 3), 2.0), cosines(2.0, amplitude=np.sqrt(2))], axis=1)
     # deviations 0, 0, 0, 1 over 2001 samples, whose mean is close to 1/4
@@ -203,6 +204,7 @@ def test_own_clock_has_no_window_as_soon_as_one_node_has_none():
     assert fourier_features(T, u, window_reference="ring").status is Status.DONE
 
 
+@pytest.mark.filterwarnings("ignore:fourier_features:UserWarning")
 def test_a_node_that_stands_still_among_others_has_zeros():
     u = np.concatenate([cosines(2.0), np.full((2001, 1), 0.1)], axis=1)
     f = fourier_features(T, u)

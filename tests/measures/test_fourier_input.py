@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.measures.fourier import fourier_features
+from chimera_hpc.measures.fourier import fourier_features, measure_signals
 
 T = np.arange(2001) * 0.01
 U = np.cos(4 * np.pi * T[:, None] + np.arange(3))
@@ -40,7 +40,7 @@ def broken(array, index, value):
         (T[:, None], U, {}, "t must have shape"),
         (T, U[:, 0], {}, r"u must have shape \(times, nodes\), not \(2001,\)"),
         (T, U[:, :0], {}, "u must have shape"),
-        (T, U.T, {}, "t must have shape"),
+        (T, U.T, {}, r"t must have shape .*; u is \(3, 2001\): are its axes swapped\? pass u\.T"),
         (T[:2], U[:2], {}, "at least 3 times, not 2"),
         (T[::-1], U, {}, "t must be finite and rise"),
         (broken(T, -1, np.inf), U, {}, "t must be finite and rise"),
@@ -72,3 +72,27 @@ def test_times_off_by_less_than_a_hundredth_of_a_step_are_uniform():
 def test_masked_array_without_a_masked_value_is_an_array():
     found = fourier_features(T, np.ma.masked_greater(U, 2.0))
     assert found.as_array().tobytes() == fourier_features(T, U).as_array().tobytes()
+
+
+@pytest.mark.parametrize(
+    ("u", "options", "message"),
+    [
+        (np.column_stack([U, 0 * T]), {}, "column 3 of u never changes"),
+        (np.column_stack([U, T]), {}, "column 3 of u rises or falls throughout"),
+        (1e-6 * U, {}, "steady: .* which has the unit of u; .* pass steady_threshold=7e-09"),
+    ],
+)
+def test_signals_that_look_like_none_are_named(u, options, message):
+    with pytest.warns(UserWarning, match=message) as said:
+        fourier_features(T, u, **options)
+    assert [str(line.message).partition(":")[0] for line in said] == ["fourier_features"]
+
+
+def test_axes_that_seem_to_be_swapped_are_named():
+    t = np.arange(8) * 0.01
+    with pytest.warns(UserWarning, match=r"8 times of 2001 nodes .* swapped\? Pass u\.T"):
+        fourier_features(t, U[:, [0, 1, 2, 2, 1, 0, 1, 2]].T)
+
+
+def test_own_measurements_say_nothing_of_their_signals():
+    assert measure_signals(T, np.column_stack([U, 0 * T])).status.name == "DONE"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
-from chimera_hpc.measures.fourier import fourier_features
+from chimera_hpc.measures.fourier import measure_signals
 from chimera_hpc.measures.synthetic import profile_error, synthetic_profiles, synthetic_signal
 from chimera_hpc.measures.windows import maxima, windows
 from chimera_hpc.reduction.analysis_input import AnalysisInput
@@ -45,7 +45,7 @@ def synthetic(given: AnalysisInput) -> dict[str, Any]:
     truth = synthetic_profiles()._asdict()
     found, errors = {}, {}
     for refine in _REFINES:
-        made = fourier_features(t, u, refine=refine, window_reference="own", time_origin="absolute")
+        made = measure_signals(t, u, refine=refine, window_reference="own", time_origin="absolute")
         found[refine] = {name: getattr(made, name) for name in truth}
         errors[refine] = {
             name: float(
