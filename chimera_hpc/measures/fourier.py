@@ -32,11 +32,11 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
 from chimera_hpc.measures.checks import Array, choice, node_rows
-from chimera_hpc.measures.recording import (
+from chimera_hpc.measures.signals_input import (
     check_node,
     check_threshold,
     check_windows,
-    recording,
+    checked_signals,
     suspect_signals,
     suspect_steadiness,
 )
@@ -238,7 +238,7 @@ def window_lines(
     steady_threshold: float = 1e-2,
 ) -> WindowLines:
     """Lines of all signals in all windows. Parameters and errors as in `fourier_features`."""
-    given = recording(t, u)
+    given = checked_signals(t, u)
     n_nodes = given.x.shape[0]
     n_peaks, n_overlap = check_windows(n_peaks, n_overlap)
     reference_node = check_node(reference_node, n_nodes)

@@ -23,7 +23,7 @@ _FEWEST = 20
 
 
 @dataclass(frozen=True)
-class Recording:
+class CheckedSignals:
     """Checked input: N signals in rows (N, T), sampled at t[0] + dt * (0 .. T-1)."""
 
     t: Array
@@ -31,7 +31,7 @@ class Recording:
     x: Array
 
 
-def recording(t: ArrayLike, u: ArrayLike) -> Recording:
+def checked_signals(t: ArrayLike, u: ArrayLike) -> CheckedSignals:
     """Return times (T,) and signals (T, N), checked; BadInput as in `fourier_features`."""
     times, rows = floats("t", t), node_rows("u", u)
     n_times = rows.shape[1]
@@ -51,7 +51,7 @@ def recording(t: ArrayLike, u: ArrayLike) -> Recording:
         raise BadInput(
             f"t must be uniform: a time is {departure:.3g} steps off, allowed is {_UNIFORM:g}"
         )
-    return Recording(times, dt, rows)
+    return CheckedSignals(times, dt, rows)
 
 
 def suspect_signals(x: Array) -> list[str]:
