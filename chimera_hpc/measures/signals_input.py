@@ -66,9 +66,8 @@ def suspect_signals(x: Array) -> list[str]:
     if one_way.any() and x.shape[1] >= _FEWEST:
         what = "rises or falls throughout: a time, a counter or a phase?"
         lines.append(f"{_columns(one_way)} {what} Leave it out, or pass its sine")
-    along, across = np.mean(np.square(steps)), np.inf
-    if len(x) > 1:
-        across = np.mean(np.square(np.diff(x, axis=0)))
+    along = float(np.mean(np.square(steps)))
+    across = float(np.mean(np.square(np.diff(x, axis=0)))) if len(x) > 1 else math.inf
     if len(x) >= x.shape[1] and across < along / _SMOOTHER:
         lines.append(
             f"u has {x.shape[1]} times of {len(x)} nodes and is smoother along the nodes: are its "
