@@ -168,7 +168,7 @@ def read_times(times: list[str], name: str, tmp_path: Path) -> Recording:
 def test_forms_of_dates(times: list[str], name: str, seconds: list[float], tmp_path: Path):
     found = read_times(times, name, tmp_path)
     assert found.t == pytest.approx(seconds)
-    assert found.warnings == ()
+    assert [line for line in found.warnings if "--transpose" not in line] == []
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_forms_of_dates(times: list[str], name: str, seconds: list[float], tmp_p
     ],
 )
 def test_doubtful_units_of_time_are_warned_of(times: list[str], said: str, tmp_path: Path):
-    (line,) = read_times(times, "time", tmp_path).warnings
+    line = read_times(times, "time", tmp_path).warnings[0]
     assert re.search(said, line)
 
 
