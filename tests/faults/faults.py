@@ -518,7 +518,8 @@ def _scheduler(trial: Trial, file: Path) -> Iterator[list[subprocess.Popen[bytes
         log.close()
 
 
-_HANG = (*("--set", "integrator.time_out=3"), *("--set", "run.patience=5"))
+# A point on a crowded machine needs seconds.
+_HANG = (*("--set", "integrator.time_out=15"), *("--set", "run.patience=5"))
 TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
     # Processes that die
     Strike("kill -9 of a worker", LOCAL, _kill_a_worker, 0, BLOCK),
