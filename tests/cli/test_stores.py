@@ -335,9 +335,9 @@ def test_folder_of_a_sweep_stands_for_its_job(
     finished: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, _ = sweep("run", finished, "--cluster", "serial", "--no-figures")
+    code, _, err = sweep("run", finished, "--cluster", "serial", "--no-figures")
     assert code == 0
-    assert "nothing to compute" in out
+    assert "nothing to compute" in err
     code, _, err = sweep("run", finished, "--set", "seeds=7")
     assert code == 2
     assert "seeds: 7 here, 5 in the store; to add its points to this store: extend" in err
