@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from store_tools import results, small_sweep
+from store_tools import encode_series, results, small_sweep
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import DamagedChunk
-from chimera_hpc.store.schema import encode_series
 from chimera_hpc.store.store import Store
 
 
