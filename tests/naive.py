@@ -136,6 +136,52 @@ def total_variations(phase, amplitude, frequency):
     return v_theta, v_a, v_omega
 
 
+def stands_out(x, peak, prominence):
+    """Whether a maximum is `prominence` above the higher of the lowest points beside it."""
+    lowest = []
+    for side in (x[:peak][::-1], x[peak + 1 :]):
+        higher = np.flatnonzero(side > x[peak])
+        lowest.append(side[: higher[0] if higher.size else None].min())
+    return x[peak] - max(lowest) >= prominence
+
+
+def polished(y, frequency):
+    """Frequency per sample of the least-squares sine, by Gauss-Newton steps with `lstsq`."""
+    s = np.arange(y.size) - (y.size - 1) / 2
+    for _ in range(20):
+        c, d = np.cos(2 * np.pi * frequency * s), np.sin(2 * np.pi * frequency * s)
+        (a, b, _), *_ = np.linalg.lstsq(np.c_[c, d, np.ones_like(s)], y, rcond=None)
+        slope = 2 * np.pi * s * (b * c - a * d)
+        step = np.linalg.lstsq(np.c_[c, d, np.ones_like(s), slope], y, rcond=None)[0][3]
+        frequency += step
+    return frequency
+
+
+def paper_printed(t, u, n_peaks=10, n_overlap=5, max_windows=4, prominence=0.1, still=1e-2):
+    """V_theta, V_a, V_Omega by the recipe of the preset paper-printed, written from its text."""
+    dt = (t[-1] - t[0]) / (t.size - 1)
+    variation = lambda z: np.abs(np.roll(z, -1) - z).mean()  # noqa: E731
+    level = (0.0, variation(u.mean(axis=0)), 0.0)
+    if u.std(axis=0).mean() < still:
+        return level
+    means = []
+    for x in u.T:
+        peaks = np.array([k for k in maxima(x) if stands_out(x, k, prominence)], dtype=int)
+        rows = []
+        for first, last in windows(peaks, n_peaks, n_overlap)[:max_windows]:
+            y = x[first : last + 1] - x[first : last + 1].mean()
+            s = np.arange(y.size)
+            f = polished(y, dominant_frequency(y, 1.0))
+            angle = 2 * np.pi * f * s
+            basis = np.c_[np.cos(angle), np.sin(angle), np.ones_like(s)]
+            (a, b, _), *_ = np.linalg.lstsq(basis, y, rcond=None)
+            rows.append((wrap(np.arctan2(-b, a) - 2 * np.pi * f * first), np.hypot(a, b), f / dt))
+        if not rows:
+            return level
+        means.append(np.mean(rows, axis=0))
+    return total_variations(*np.array(means).T)
+
+
 # --- features: incoherence and order -------------------------------------------------------------
 
 

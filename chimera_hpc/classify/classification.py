@@ -1,6 +1,6 @@
 """From triplets of total variations to named classes (paper, ssec:classific).
 
-The triplets (V_theta, V_a, V_Omega) of all oscillating runs are scaled to [0, 1] and merged
+The triplets (V_theta, V_a, V_Omega) of all runs that have one are scaled to [0, 1] and merged
 bottom-up into one tree. The tree is cut by number of clusters or at a depth threshold d.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from chimera_hpc.base.errors import BadInput
@@ -80,12 +80,12 @@ def classify(
     largest_tree: int | None = None,
     known: tuple[Floats, Integers] | None = None,
 ) -> Classification:
-    """Cluster the points whose status is DONE and name the clusters.
+    """Cluster the points that have a triplet (see `has_triplet`) and name the clusters.
 
     Parameters
     ----------
     triplets : (n, 3) array
-        V_theta, V_a, V_Omega. Rows of points that are not DONE are ignored and may be NaN.
+        V_theta, V_a, V_Omega; NaN where a point has none.
     status : (n,) integers
         `chimera_hpc.base.status.Status` of each point.
     linkage : {"ward", "average", "complete"}
@@ -117,7 +117,7 @@ def classify(
     _check(linkage, cuts, depth)
     base_size = naming.base_size(names)
     points = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
-    clustered = np.flatnonzero(np.asarray(status) == Status.DONE)
+    clustered = np.flatnonzero(has_triplet(points, status))
     if not np.isfinite(points[clustered]).all():
         raise ValueError("a point with status DONE has a triplet that is not finite")
     scaler = tree.limits(points[clustered])
@@ -143,6 +143,17 @@ def classify(
         depth=depth,
         sampled=len(leaves) < len(clustered),
     )
+
+
+def has_triplet(triplets: Floats, status: ArrayLike) -> NDArray[np.bool_]:
+    """Tell which points are clustered: those that are DONE, and other results with a triplet.
+
+    Runs that do not oscillate have one if they are measured with steady = "level".
+    """
+    state = np.asarray(status)
+    still = (state == Status.STEADY) | (state == Status.NO_WINDOW)
+    found: NDArray[np.bool_] = (state == Status.DONE) | (still & np.isfinite(triplets).all(axis=1))
+    return found
 
 
 def _check(linkage: str, cuts: Sequence[int], depth: float | None) -> None:

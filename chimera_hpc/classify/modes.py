@@ -54,11 +54,14 @@ def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[s
 
 
 def vote_labels(labels: Integers, status: ArrayLike, n_classes: int) -> Integers:
-    """Extend labels: `n_classes` for steady runs, one more for no window, -1 for no result."""
+    """Extend labels (-1: none): `n_classes` for steady runs, one more for those without a window.
+
+    Runs of these kinds that have a label keep it. Points without a result have -1.
+    """
     state = np.asarray(status)
-    vote = np.where(state == Status.DONE, labels, -1)
-    vote[state == Status.STEADY] = n_classes
-    vote[state == Status.NO_WINDOW] = n_classes + 1
+    vote = np.where((state >= Status.DONE) & (state <= Status.NO_WINDOW), labels, -1)
+    vote[(vote < 0) & (state == Status.STEADY)] = n_classes
+    vote[(vote < 0) & (state == Status.NO_WINDOW)] = n_classes + 1
     return vote
 
 

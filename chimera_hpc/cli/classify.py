@@ -33,9 +33,13 @@ those of the atlas, --rescale guesses the factors from the medians. What is miss
 of pickled objects are refused.
 """
 
+_NOT_SET = ("preset", "start", "groups")
+"""Keys of [features] that do not say how a recording is measured, or that have a flag."""
+
 
 def add_arguments(parser: ArgumentParser) -> None:
     rescale = "find those factors: median frequency and amplitude become those of the atlas's runs"
+    preset = "default or paper-printed: sets several settings (default: those of the atlas)"
     setting = "a setting of the table [features], e.g. n_peaks=5; may be repeated"
     along = "what to take along another dimension (NetCDF, Zarr); may be repeated"
     parser.add_argument("file", **value("FILE", Path, "the recording"))
@@ -60,6 +64,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         lowpass=value("F", float, "damp frequencies above F, in the file's unit"),
         factors=value("T,U", str, "multiply times by T and signals by U: the atlas's units"),
         rescale=flag(rescale),
+        preset=value("NAME", str, preset),
         set=value("KEY=VALUE", str, setting, dest="overrides", action="append", default=[]),
     )
     add(
@@ -90,8 +95,8 @@ def _answer(args: Namespace) -> list[str]:
     from chimera_hpc.recordings.prepare import in_order, with_times
     from chimera_hpc.recordings.read import read_recording
 
-    judge = None if args.atlas is None else Judge.load(args.atlas)
-    settings = _settings(args.overrides, judge)
+    judge = None if args.atlas is None else Judge.load(args.atlas, args.preset)
+    settings = _settings(args.overrides, judge, args.preset)
     read = read_recording(args.file, _choice(args))
     scale = _factors(args)
     absolute = any(name in text for text in args.overrides for name in ("still", "steady"))
@@ -142,8 +147,8 @@ def _choice(args: Namespace) -> Any:
     return Choice(args.variable, args.time, tuple(selected), args.transpose, no_times, drop)
 
 
-def _settings(overrides: list[str], judge: Judge | None) -> Features:
-    """Return how to measure: as the atlas was, or by default, with what the user sets."""
+def _settings(overrides: list[str], judge: Judge | None, preset: str | None) -> Features:
+    """Return how to measure: as the atlas was, or by a preset, with what the user sets."""
     from pydantic import ValidationError
 
     from chimera_hpc.job.reading import apply_overrides
@@ -152,12 +157,15 @@ def _settings(overrides: list[str], judge: Judge | None) -> Features:
     wrong = next((text for text in overrides if "=" not in text), None)
     if wrong is not None:
         raise BadInput(f"--set {wrong}: KEY=VALUE is needed")
-    base = Features.model_validate({}) if judge is None else judge.settings
+    default = {"preset": preset or "default"}
+    base = Features.model_validate(default) if judge is None else judge.settings
     keys = [f"features.{text.removeprefix('features.')}" for text in overrides]
-    data = apply_overrides({"features": base.model_dump()}, keys)["features"]
+    data = apply_overrides({"features": base.model_dump(exclude={"preset"})}, keys)["features"]
+    if "preset" in data:
+        raise BadInput(f"--set preset: give it as --preset {data['preset']}")
     unknown = [name for name in data if name not in Features.model_fields]
     if unknown:
-        known = ", ".join(name for name in Features.model_fields if name not in ("start", "groups"))
+        known = ", ".join(name for name in Features.model_fields if name not in _NOT_SET)
         raise BadInput(f"--set {unknown[0]}: no such key in [features]; known: {known}")
     try:
         return Features.model_validate(data)

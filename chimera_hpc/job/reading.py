@@ -17,8 +17,10 @@ from chimera_hpc.base.wording import short
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.tables import TABLES, unknown_key
 from chimera_hpc.job.user_models import Origin
+from chimera_hpc.measures.conventions import PRESETS
 
 _BARE = re.compile(r"[^\[{\"'\n\r=#]+")
+_PRESET_KEYS = frozenset(PRESETS["default"])
 _TOP = ("name", "title", "model")
 
 
@@ -54,8 +56,9 @@ def apply_overrides(
 
     KEY is `table.key`, or a bare key: name, title, model; `seeds`; a parameter of the model; or a
     key of exactly one other table. A parameter is set in [grid] if it is an axis already or if the
-    value is one (a list, a range, a name), else in [fixed]. VALUE is TOML, or bare text such as
-    3:8, P or sine-fit. `origin` tells where a user's model comes from.
+    value is one (a list, a range, a name), else in [fixed]. A preset replaces what the data say of
+    its settings. VALUE is TOML, or bare text such as 3:8, P or sine-fit. `origin` tells where a
+    user's model comes from.
     """
     changed = {key: dict(v) if isinstance(v, dict) else v for key, v in data.items()}
     for override in overrides:
@@ -71,6 +74,8 @@ def apply_overrides(
             changed["fixed"].pop(name, None)
         else:
             changed[table][name] = value
+            if (table, name) == ("features", "preset"):
+                changed[table] = {k: v for k, v in changed[table].items() if k not in _PRESET_KEYS}
     return changed
 
 

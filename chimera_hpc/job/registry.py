@@ -41,6 +41,7 @@ MEASURES = {
     "order_parameter": "chimera_hpc.measures.scalars:ORDER_PARAMETER",
     "distance": "chimera_hpc.measures.scalars:DISTANCE",
     "local_sigma": "chimera_hpc.measures.scalars:LOCAL_SIGMA",
+    "paper-printed": "chimera_hpc.measures.scalars:PAPER_PRINTED",
 }
 """Measures of a run: `measures.measure.Measure`."""
 

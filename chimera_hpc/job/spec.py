@@ -59,6 +59,8 @@ from chimera_hpc.models.parameters import ModelParameters
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
 _OLD_NAMES = {new: old for old, new in renaming.FEATURES.items()}
 _DIGESTED = ("model", "grid", "fixed", "integrator", "features")
+# Digests from before these keys existed must not change.
+_NEWER_FEATURES = {"max_windows": 0, "prominence": 0.0, "steady": "apart"}
 
 
 class Sweep(Table):
@@ -182,8 +184,8 @@ class Sweep(Table):
     def digest(self) -> str:
         """16 hexadecimal digits: 64-bit BLAKE2b of what decides the points and their numbers.
 
-        It covers model, grid (with the order of the axes), fixed, integrator and features as
-        canonical JSON, and measures unless they are the default.
+        It covers model, grid (with the order of the axes), fixed, integrator and features (what a
+        preset sets, not its name) as canonical JSON, and measures unless they are the default.
         """
         return spec_digest(self.to_dict())
 
@@ -265,13 +267,18 @@ def spec_digest(spec: Mapping[str, Any]) -> str:
     renamed settings enter it under their old names.
     """
     data = _digested(spec)
-    data["features"] = {_OLD_NAMES.get(key, key): v for key, v in data["features"].items()}
+    data["features"] = {
+        _OLD_NAMES.get(key, key): value
+        for key, value in data["features"].items()
+        if _NEWER_FEATURES.get(key) != value
+    }
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return blake2b(text.encode(), digest_size=8).hexdigest()
 
 
 def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
     data = {key: spec[key] for key in _DIGESTED}
+    data["features"] = {k: v for k, v in spec["features"].items() if k != "preset"}
     if "delta" in spec["grid"]:
         integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
         data["integrator"] = integrator

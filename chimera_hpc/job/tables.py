@@ -23,6 +23,7 @@ from chimera_hpc.job.selection import (
     check_measures,
     check_selections,
 )
+from chimera_hpc.measures.conventions import PRESETS
 
 
 def _as_tuple(value: Any) -> Any:
@@ -118,6 +119,11 @@ class Integrator(Table):
 class Features(Table):
     """How features are computed from a series."""
 
+    preset: Literal["default", "paper-printed"] = Field(
+        "default",
+        description="Sets those of the keys below that a job leaves out: all of the recording by "
+        "one clock, or the convention behind the numbers that the paper prints.",
+    )
     start: float = Field(
         950.0, ge=0, description="Start of the analysis; it ends at integrator.t_end."
     )
@@ -125,6 +131,14 @@ class Features(Table):
         10, ge=3, le=10**6, description="Maxima of one window, both ends included."
     )
     n_overlap: int = Field(5, ge=0, description="Maxima that consecutive windows share.")
+    max_windows: int = Field(
+        0, ge=0, le=10**6, description="Windows that count, from the first; 0: all."
+    )
+    prominence: float = Field(
+        0.0,
+        ge=0,
+        description="Least prominence of a maximum, in the unit of u; 0: any.",
+    )
     window_reference: Literal["ring", "own"] = Field(
         "ring",
         description="Maxima that place the windows: those of one node for all, or each node's own.",
@@ -138,8 +152,14 @@ class Features(Table):
     refine: Literal["parabola", "sine-fit"] = Field(
         "parabola", description="How the frequency of the largest line is refined."
     )
-    time_origin: Literal["window", "absolute"] = Field(
-        "window", description="Time at which a phase is read: the window's start, or 0."
+    time_origin: Literal["window", "recording", "absolute"] = Field(
+        "window",
+        description="Time of a phase: the window's start, that of the analysis, or 0.",
+    )
+    steady: Literal["apart", "level"] = Field(
+        "apart",
+        description="Runs that do not oscillate: a class of their own, or clustered by the "
+        "variation of their level along the ring.",
     )
     steady_threshold: float = Field(
         1e-2,
@@ -154,7 +174,16 @@ class Features(Table):
 
     def options(self) -> dict[str, Any]:
         """Return the keyword arguments of `fourier_features` by name."""
-        return self.model_dump(exclude={"start", "groups"})
+        return self.model_dump(exclude={"preset", "start", "groups"})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, given: Any) -> Any:
+        """Add the settings of the preset. An unknown preset is left to the check of its field."""
+        preset = given.get("preset") if isinstance(given, dict) else None
+        if isinstance(preset, str) and preset in PRESETS:
+            return {**PRESETS[preset], **given}
+        return given
 
     @model_validator(mode="after")
     def _check_overlap(self) -> Self:

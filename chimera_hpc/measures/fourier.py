@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, fields
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,19 +32,23 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
 from chimera_hpc.measures.checks import Array, choice, node_rows
+from chimera_hpc.measures.conventions import (
+    PhaseMean,
+    Preset,
+    Refine,
+    Steady,
+    TimeOrigin,
+    WindowReference,
+    accepts_presets,
+)
 from chimera_hpc.measures.signals_input import (
+    check_height,
     check_node,
-    check_threshold,
     check_windows,
     checked_signals,
     suspect_signals,
     suspect_steadiness,
 )
-
-WindowReference = Literal["ring", "own"]
-PhaseMean = Literal["circular", "arithmetic"]
-Refine = Literal["parabola", "sine-fit"]
-TimeOrigin = Literal["window", "absolute"]
 
 QUANTITIES = ("amplitude", "frequency", "phase", "baseline")
 FEATURES = (*QUANTITIES, *(f"{name}_std" for name in QUANTITIES))
@@ -60,7 +64,8 @@ class FourierFeatures:
     """Means and standard deviations over windows of the lines of N signals.
 
     All arrays have shape (N,) and are NaN unless `status` is DONE. The standard deviations are NaN
-    for a single window. The first fields are those of `FEATURES`, in order.
+    for a single window. With steady = "level", other signals have amplitude, frequency and phase 0,
+    and their mean in time as baseline. The first fields are those of `FEATURES`, in order.
     """
 
     amplitude: Array
@@ -75,6 +80,11 @@ class FourierFeatures:
     n_windows: int  # of each signal; with window_reference "own", the minimum over the signals
     deviation: float  # mean over the signals of the standard deviation in time
     status: Status  # DONE, STEADY or NO_WINDOW
+
+    @property
+    def heights(self) -> Array:
+        """What V_a compares, (N,): amplitudes; levels (baselines) of signals without any."""
+        return self.amplitude if self.status is Status.DONE else self.baseline
 
     def as_array(self) -> Array:
         """The features as one array (8, N), rows in the order of `FEATURES`."""
@@ -104,17 +114,22 @@ class WindowLines:
 
 
 @accepts_old_names(renaming.FEATURES)
+@accepts_presets
 def fourier_features(
     t: ArrayLike,
     u: ArrayLike,
     *,
+    preset: Preset = "default",
     n_peaks: int = 10,
     n_overlap: int = 5,
+    max_windows: int = 0,
+    prominence: float = 0.0,
     window_reference: WindowReference = "ring",
     reference_node: int = 0,
     phase_mean: PhaseMean = "circular",
     refine: Refine = "parabola",
     time_origin: TimeOrigin = "window",
+    steady: Steady = "apart",
     steady_threshold: float = 1e-2,
 ) -> FourierFeatures:
     r"""Mean and standard deviation of amplitude, frequency, phase and baseline of each signal.
@@ -131,9 +146,15 @@ def fourier_features(
         Uniform times.
     u : array_like, shape (T, N)
         Signals of any model or experiment. An array whose transpose is contiguous is not copied.
+    preset : {"default", "paper-printed"}
+        Sets the parameters below that `conventions.PRESETS` lists, unless the call does.
     n_peaks, n_overlap : int
         Maxima per window (>= 3), and maxima that consecutive windows share (0 <= n_overlap <
         n_peaks).
+    max_windows : int
+        Number of windows, counted from the first. 0: all.
+    prominence : float
+        Least prominence of a maximum, in the unit of u (`windows.maxima`). 0: any.
     window_reference : {"ring", "own"}
         Signal whose maxima define the windows: that of `reference_node` for all signals ("ring"),
         or each signal itself ("own").
@@ -146,10 +167,13 @@ def fourier_features(
         The three steps above (module), or a least-squares fit of frequency, amplitude, phase and
         baseline together (four-parameter sine fit, IEEE Std 1057-2017). The fit makes Gauss-Newton
         steps from the result of the three steps.
-    time_origin : {"window", "absolute"}
-        Phase at the window's first sample, or at t = 0 (pass t - t[0] for the first time). An
-        absolute phase has the error of the frequency times 2 pi t, so use the sine fit far from
-        t = 0.
+    time_origin : {"window", "recording", "absolute"}
+        Phase at the window's first sample, at t[0], or at t = 0. The latter two have the error of
+        the frequency times 2 pi (t - t[0]) or 2 pi t, so use the sine fit far from the origin.
+    steady : {"apart", "level"}
+        Features of signals that do not oscillate (status STEADY or NO_WINDOW): NaN, or amplitude,
+        frequency and phase 0 and the mean in time as baseline. Their triplet of total variations is
+        then (0, mean |<u>_{i+1} - <u>_i|, 0).
     steady_threshold : float
         Limit for the mean over signals of the standard deviation in time of u, in the unit of u.
 
@@ -190,11 +214,14 @@ def fourier_features(
         u,
         n_peaks=n_peaks,
         n_overlap=n_overlap,
+        max_windows=max_windows,
+        prominence=prominence,
         window_reference=window_reference,
         reference_node=reference_node,
         phase_mean=phase_mean,
         refine=refine,
         time_origin=time_origin,
+        steady=steady,
         steady_threshold=steady_threshold,
     )
     rows = node_rows("u", u)
@@ -207,10 +234,16 @@ def fourier_features(
 
 
 def measure_signals(
-    t: ArrayLike, u: ArrayLike, *, phase_mean: PhaseMean = "circular", **options: Any
+    t: ArrayLike,
+    u: ArrayLike,
+    *,
+    phase_mean: PhaseMean = "circular",
+    steady: Steady = "apart",
+    **options: Any,
 ) -> FourierFeatures:
     """Do as `fourier_features`, without a look at what the signals are."""
     choice("phase_mean", phase_mean, get_args(PhaseMean))
+    choice("steady", steady, get_args(Steady))
     found = window_lines(t, u, **options)
     out = np.full((len(FEATURES) + 1, found.amplitude.shape[0]), np.nan)
     n_windows = 0
@@ -218,6 +251,9 @@ def measure_signals(
         n_windows = int(found.counts.min())
         values = np.stack([getattr(found, name) for name in _COLUMNS])
         _average(values, found.counts, phase_mean == "circular", out)
+    elif steady == "level":
+        out[: len(QUANTITIES)] = 0.0
+        out[QUANTITIES.index("baseline")] = node_rows("u", u).mean(axis=1)
     rows = dict(zip((*FEATURES, "r_squared"), out, strict=True))
     return FourierFeatures(
         **rows, n_windows=n_windows, deviation=found.deviation, status=found.status
@@ -231,6 +267,8 @@ def window_lines(
     *,
     n_peaks: int = 10,
     n_overlap: int = 5,
+    max_windows: int = 0,
+    prominence: float = 0.0,
     window_reference: WindowReference = "ring",
     reference_node: int = 0,
     refine: Refine = "parabola",
@@ -240,19 +278,20 @@ def window_lines(
     """Lines of all signals in all windows. Parameters and errors as in `fourier_features`."""
     given = checked_signals(t, u)
     n_nodes = given.x.shape[0]
-    n_peaks, n_overlap = check_windows(n_peaks, n_overlap)
+    placing = check_windows(n_peaks, n_overlap, max_windows)
     reference_node = check_node(reference_node, n_nodes)
     choice("window_reference", window_reference, get_args(WindowReference))
     choice("refine", refine, get_args(Refine))
     choice("time_origin", time_origin, get_args(TimeOrigin))
-    check_threshold(steady_threshold)
+    check_height("prominence", prominence)
+    check_height("steady_threshold", steady_threshold)
 
     deviation = _mean_deviation(given.x)
     if deviation < steady_threshold:
         return _no_lines(n_nodes, deviation, Status.STEADY)
     own = window_reference == "own"
-    placing = given.x if own else given.x[reference_node : reference_node + 1]
-    first, last, counts = _place_windows(placing, n_peaks, n_overlap)
+    references = given.x if own else given.x[reference_node : reference_node + 1]
+    first, last, counts = windows.place_windows(references, prominence, *placing)
     if counts.min() == 0:
         return _no_lines(n_nodes, deviation, Status.NO_WINDOW)
     table = np.full((n_nodes, first.shape[1], len(_COLUMNS)), np.nan)
@@ -261,8 +300,9 @@ def window_lines(
     _fill_lines(given.x, first, last, counts, bins, refine == "sine-fit", work, table)
     values = np.ascontiguousarray(table.transpose(2, 0, 1))
     values[_FREQUENCY] /= 2.0 * np.pi * given.dt
-    if time_origin == "absolute":
-        values[_PHASE] -= 2.0 * np.pi * values[_FREQUENCY] * given.t[first]
+    if time_origin != "window":
+        origin = given.t[0] if time_origin == "recording" else 0.0
+        values[_PHASE] -= 2.0 * np.pi * values[_FREQUENCY] * (given.t[first] - origin)
     values[_PHASE] = wrap(values[_PHASE])
     columns = dict(zip(_COLUMNS, values, strict=True))
     return WindowLines(
@@ -288,20 +328,6 @@ def _no_lines(n_nodes: int, deviation: float, status: Status) -> WindowLines:
         deviation=deviation,
         status=status,
     )
-
-
-def _place_windows(
-    references: Array, n_peaks: int, n_overlap: int
-) -> tuple[windows.Samples, windows.Samples, windows.Samples]:
-    """Return first and last samples (C, q) and counts (C,) of the windows of C signals (C, T)."""
-    placed = [windows.windows(windows.maxima(x), n_peaks, n_overlap) for x in references]
-    counts = np.array([last.size for _, last in placed])
-    first = np.zeros((len(placed), counts.max()), dtype=np.int64)
-    last = np.zeros_like(first)
-    for row, (begins, ends) in enumerate(placed):
-        first[row, : begins.size] = begins
-        last[row, : ends.size] = ends
-    return first, last, counts
 
 
 @jit()

@@ -16,6 +16,16 @@ def _variations(run: MeasuredRun) -> Sequence[float]:
     return total_variations(run.features)
 
 
+def _paper_printed(run: MeasuredRun) -> Sequence[float]:
+    from chimera_hpc.measures.conventions import PRESETS
+    from chimera_hpc.measures.fourier import measure_signals
+    from chimera_hpc.measures.variation import total_variations
+
+    settings = {**run.settings.options(), **PRESETS["paper-printed"]}
+    features = measure_signals(run.t, run.u, **settings)
+    return *total_variations(features), float(features.status)
+
+
 def _sigma(run: MeasuredRun) -> Sequence[float]:
     from chimera_hpc.measures.incoherence import sigma
 
@@ -41,6 +51,10 @@ def _local_sigma(run: MeasuredRun) -> NDArray[np.float64]:
 
 
 VARIATIONS = Measure(lambda _: ("V_theta", "V_a", "V_Omega"), _variations)
+PAPER_PRINTED = Measure(
+    lambda _: ("V_theta_printed", "V_a_printed", "V_Omega_printed", "status_printed"),
+    _paper_printed,
+)
 SIGMA = Measure(lambda _: ("sigma_1", "sigma_2"), _sigma)
 DEVIATION = Measure(lambda _: ("std_u",), lambda run: (run.features.deviation,))
 RANGE = Measure(lambda _: ("range_u",), _range)

@@ -93,14 +93,17 @@ def _columns(which: NDArray[np.bool_]) -> str:
     return f"column {', '.join(numbers)}{more} of u"
 
 
-def check_windows(n_peaks: int, n_overlap: int) -> tuple[int, int]:
-    """Return maxima per window and shared maxima as integers; BadInput if they make no windows."""
+def check_windows(n_peaks: int, n_overlap: int, max_windows: int) -> tuple[int, int, int]:
+    """Return the settings of windows as integers; BadInput if they make no windows."""
     n_peaks, n_overlap = integer("n_peaks", n_peaks), integer("n_overlap", n_overlap)
     if n_peaks < 3:
         raise BadInput(f"n_peaks must be at least 3, not {n_peaks}")
     if not 0 <= n_overlap < n_peaks:
         raise BadInput(f"n_overlap must be in 0 .. n_peaks - 1 = {n_peaks - 1}, not {n_overlap}")
-    return n_peaks, n_overlap
+    max_windows = integer("max_windows", max_windows)
+    if max_windows < 0:
+        raise BadInput(f"max_windows must be at least 1, or 0 for all windows, not {max_windows}")
+    return n_peaks, n_overlap, max_windows
 
 
 def check_node(reference_node: int, n_nodes: int) -> int:
@@ -111,7 +114,7 @@ def check_node(reference_node: int, n_nodes: int) -> int:
     return reference_node
 
 
-def check_threshold(threshold: float) -> None:
-    """Raise BadInput unless the threshold is finite and not negative."""
-    if not 0.0 <= threshold < math.inf:
-        raise BadInput(f"steady_threshold must be a finite number >= 0, not {threshold}")
+def check_height(name: str, value: float) -> None:
+    """Raise BadInput unless a value in the unit of u is finite and not negative."""
+    if not 0.0 <= value < math.inf:
+        raise BadInput(f"{name} must be a finite number >= 0, not {value}")

@@ -24,13 +24,15 @@ class HasProfiles(Protocol):
     def frequency(self) -> Array: ...
 
 
-def total_variations(features: HasProfiles) -> tuple[float, float, float]:
+def total_variations(features: HasProfiles, *, ring: bool = True) -> tuple[float, float, float]:
     """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, section ssec:TNVar).
 
     As `total_variation_arrays`, for an object with the attributes phase, amplitude and frequency.
-    The result is NaN if the features are NaN, i.e. if their status is not DONE.
+    The result is NaN if the features are NaN, i.e. if their status is not DONE. Features that were
+    made with steady = "level" have the levels of such a run in place of the amplitudes.
     """
-    return total_variation_arrays(features.phase, features.amplitude, features.frequency)
+    heights = getattr(features, "heights", features.amplitude)
+    return total_variation_arrays(features.phase, heights, features.frequency, ring=ring)
 
 
 def total_variation_arrays(

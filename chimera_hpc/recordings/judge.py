@@ -13,15 +13,18 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Features
+from chimera_hpc.measures.conventions import PRESETS
 from chimera_hpc.measures.fourier import FourierFeatures, measure_signals
 from chimera_hpc.measures.quality import FEW_SAMPLES
-from chimera_hpc.measures.variation import total_variation_arrays
+from chimera_hpc.measures.variation import total_variations
 from chimera_hpc.measures.windows import maxima
 from chimera_hpc.recordings.columns import STILL, how_to_drop, some_of
 from chimera_hpc.recordings.gaps import called
 from chimera_hpc.recordings.prepare import Prepared
 from chimera_hpc.reduction.atlases import load_atlas
+from chimera_hpc.reduction.conventions import OWN, conventions
 from chimera_hpc.store.store import Store
 
 Array = NDArray[np.float64]
@@ -56,16 +59,34 @@ class Judge:
     amplitude: float
 
     @classmethod
-    def load(cls, path: Path) -> Judge:
-        """Read the atlas of a reduced sweep, from its folder or its store; BadInput without one."""
+    def load(cls, path: Path, preset: str | None = None) -> Judge:
+        """Read the atlas of a reduced sweep, from its folder or its store; BadInput without one.
+
+        With a preset, the atlas is that of the sweep's triplets under it; BadInput if it has none.
+        """
         folder = path.parent if (path / "zarr.json").is_file() else path
-        atlas = load_atlas(folder)
+        store = Store.open(folder / "store.zarr")
+        settings, convention = _measured_by(folder, store.sweep, preset)
+        atlas = load_atlas(folder, convention)
         if not atlas.names:
             raise BadInput(f"{folder}: no run of this sweep oscillates: it has no classes")
-        store = Store.open(folder / "store.zarr")
         frequency, amplitude = _typical(store)
-        sweep = store.sweep
-        return cls(folder, atlas, sweep.integrator.t_step, sweep.features, frequency, amplitude)
+        return cls(folder, atlas, store.sweep.integrator.t_step, settings, frequency, amplitude)
+
+
+def _measured_by(folder: Path, sweep: Sweep, preset: str | None) -> tuple[Features, str]:
+    """Return the settings of a sweep's triplets under a preset, and the name of their atlas."""
+    if preset is None:
+        return sweep.features, OWN
+    settings = sweep.features.model_copy(update=dict(PRESETS[preset]))
+    if settings == sweep.features:
+        return settings, OWN
+    if preset not in conventions(sweep):
+        raise BadInput(
+            f"--preset {preset}: the runs of {folder} were not measured by it; a sweep with "
+            f'[features] preset = "{preset}" is needed, or one with "{preset}" in [measures] panel'
+        )
+    return settings, preset
 
 
 @dataclass(frozen=True)
@@ -112,7 +133,7 @@ class Measured:
     @property
     def name(self) -> str | None:
         """The class: of the atlas, ``steady`` or ``no_window``; None without or outside one."""
-        if self.features.status is not Status.DONE:
+        if self.features.status is not Status.DONE and self.verdict is None:
             return self.features.status.name.lower()
         return None if self.verdict is None or self.verdict.outside else self.verdict.name
 
@@ -134,9 +155,7 @@ def measure(
         raise BadInput(f"{what}: a {'ring' if ring else 'chain'} has at least {least}")
     limit, warnings = _steady_below(made.u, settings.steady_threshold, judge, absolute)
     features = features_of(made, settings, limit)
-    triplet = total_variation_arrays(
-        features.phase, features.amplitude, features.frequency, ring=ring
-    )
+    triplet = total_variations(features, ring=ring)
     fastest = float(np.nanmax(np.append(features.frequency, 0.0)))
     samples = 1.0 / (fastest * made.recorded_step) if fastest > 0.0 else float("nan")
     for what, step in (("the recording", made.recorded_step), ("the grid", made.step)):
@@ -150,9 +169,9 @@ def measure(
     warnings += _noise(made, settings, features)
     warnings += _poor(made, settings, features)
     verdict = None
-    if judge is not None and features.status is Status.DONE:
+    if judge is not None and np.isfinite(triplet).all():
         verdict = verdict_of(judge.atlas, np.array(triplet))
-        warnings += _unlike(features, judge)
+        warnings += _unlike(features, judge) if features.status is Status.DONE else []
     return Measured(features, triplet, samples, verdict, tuple(warnings))
 
 
@@ -229,7 +248,7 @@ def _noise(made: Prepared, settings: Features, features: FourierFeatures) -> lis
     if features.status is not Status.DONE:
         return []
     node = settings.reference_node
-    count = len(maxima(np.ascontiguousarray(made.u[:, node])))
+    count = len(maxima(np.ascontiguousarray(made.u[:, node]), settings.prominence))
     turns = float(features.frequency[node] * (made.t[-1] - made.t[0]))
     if count <= _MAXIMA * turns + 1.0:
         return []

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas
-from chimera_hpc.classify.classification import Classification, Cut
-from chimera_hpc.classify.modes import NO_WINDOW, STEADY, run_names
+from chimera_hpc.classify.classification import Classification, Cut, has_triplet
+from chimera_hpc.classify.modes import run_names
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.reduction.results import TRIPLET
 
@@ -49,6 +49,11 @@ class AnalysisInput:
     def triplets(self) -> Array:
         """V_theta, V_a, V_Omega, shape (n, 3)."""
         return np.stack([self.scalars[name] for name in TRIPLET], axis=1)
+
+    @cached_property
+    def clustered(self) -> NDArray[np.bool_]:
+        """Whether a point has a triplet, shape (n,)."""
+        return has_triplet(self.triplets, self.status)
 
     @cached_property
     def has_result(self) -> NDArray[np.bool_]:
@@ -99,9 +104,5 @@ class AnalysisInput:
 
     def judged_names(self, atlas: Atlas) -> list[str | None]:
         """Return the class of each run by an atlas: also steady, no_window or None."""
-        names: list[str | None] = list(atlas.classify(self.triplets).name)
-        others = {Status.STEADY: STEADY, Status.NO_WINDOW: NO_WINDOW}
-        return [
-            name if code == Status.DONE else others.get(Status(code))
-            for name, code in zip(names, self.status.tolist(), strict=True)
-        ]
+        labels = np.where(self.clustered, atlas.classify(self.triplets).label, -1)
+        return run_names(labels, self.status, atlas.names)

@@ -24,10 +24,12 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.classification import has_triplet
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY, count_votes, modal_votes, vote_labels
 from chimera_hpc.classify.resampling import DRAWS, FIRM, compare_labels, kept_shares, spread_sample
 from chimera_hpc.reduction.audit_runs import WAYS, Runs, compute_again, described, runs_of
 from chimera_hpc.reduction.cells import free_axes
+from chimera_hpc.reduction.conventions import OWN, conventions, seen_under, stored_reduction
 from chimera_hpc.reduction.results import count_points, json_safe, read_results, to_json
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import StoredReduction
@@ -88,7 +90,8 @@ class Labeller:
             names = np.where(runs.distance <= radius, "inside", "outside").tolist()
         else:
             names = self.atlas.classify(runs.triplets).name
-        done = [self.atlas is None or code == Status.DONE for code in runs.status.tolist()]
+        known = has_triplet(runs.triplets, runs.status)
+        done = [self.atlas is None or has for has in known.tolist()]
         return [
             (name if ok else Status(code).name.lower()) if Status(code).is_result else None
             for name, ok, code in zip(names, done, runs.status.tolist(), strict=True)
@@ -128,7 +131,8 @@ def audit_sweep(
 ) -> dict[str, Any]:
     """Audit a reduced sweep, and write what was found into results.json under ``audit``.
 
-    The store is read only. Killed at any moment, results.json is whole, old or new.
+    The store is read only. Killed at any moment, results.json is whole, old or new. Labels under
+    the other conventions of the sweep's panel are compared too, for the same runs.
 
     folder: a sweep's folder, the one that holds store.zarr.
     workers: worker processes on this machine; below 2 this process computes. The result is the
@@ -136,15 +140,17 @@ def audit_sweep(
     ways: of `audit_runs.WAYS`.
     on_piece: called with the numbers of runs done and in all, as they are done.
 
-    Returns what results.json holds; docs/audit.md has the keys.
+    Returns what results.json holds for the sweep's own convention; docs/audit.md has the keys.
 
     Raises BadInput: no store, not reduced since its last points were computed, or no point with a
     result.
     Raises DamagedChunk: A chunk of results that the ledger vouches for is missing or damaged.
     """
     folder = Path(folder)
-    before = read_results(folder / _RESULTS)
-    basis, stored = _standing(folder, before)
+    named = conventions(Store.open(folder / STORE_NAME).sweep)
+    before = {name: read_results(folder / name / _RESULTS) for name in named}
+    standing = {name: _standing(folder, name, before[name]) for name in named}
+    basis = standing[OWN][0]
     usable = np.flatnonzero([label is not None for label in basis.labels])
     if not len(usable):
         raise BadInput(f"{folder}: no point has a result yet; there is nothing to audit")
@@ -158,22 +164,25 @@ def audit_sweep(
         on_piece(done, len(ways) * len(chosen))
 
     again = compute_again(basis.store.path, chosen, ways, workers, tick)
-    entry: dict[str, Any] = json_safe(
-        {
-            "key": basis.key,
-            "seed": sample.seed,
-            "rule": RULE,
-            "labels": basis.judge.name,
-            "points": len(chosen),
-            "of": len(usable),
-            "total": basis.store.n_points,
-            "classes": Counter(basis.labels[i] for i in chosen),
-            **_compared(basis, stored, chosen, again),
-            "bootstrap": _bootstrap(basis, sample.seed),
-        }
-    )
-    _write(folder, before, entry)
-    return entry
+    entries: dict[str, dict[str, Any]] = {}
+    for name, (basis, stored) in standing.items():
+        runs = {way: Runs.of(basis.store.sweep, made, name) for way, made in again.items()}
+        entries[name] = json_safe(
+            {
+                "key": basis.key,
+                "seed": sample.seed,
+                "rule": RULE,
+                "labels": basis.judge.name,
+                "points": len(chosen),
+                "of": len(usable),
+                "total": basis.store.n_points,
+                "classes": Counter(basis.labels[i] for i in chosen),
+                **_compared(basis, stored, chosen, runs),
+                "bootstrap": _bootstrap(basis, sample.seed),
+            }
+        )
+        _write(folder / name, before[name], entries[name])
+    return entries[OWN]
 
 
 def kept_audit(folder: Path, basis: Callable[[], Basis]) -> tuple[dict[str, Any], str]:
@@ -192,9 +201,11 @@ def kept_audit(folder: Path, basis: Callable[[], Basis]) -> tuple[dict[str, Any]
     return {}, "the audit was of other points or classes and is dropped; `audit` makes it again"
 
 
-def _standing(folder: Path, results: Mapping[str, Any]) -> tuple[Basis, Runs]:
+def _standing(folder: Path, convention: str, results: Mapping[str, Any]) -> tuple[Basis, Runs]:
     store = Store.open(folder / STORE_NAME)
-    ledger, scalars, stored = store.ledger(), store.scalars(), store.reduction()
+    ledger, stored = store.ledger(), stored_reduction(folder, convention)
+    scalars, status = seen_under(convention, store.sweep, store.scalars(), ledger["status"])
+    ledger = {**ledger, "status": status}
     if results["points"] != count_points(ledger["status"]):
         raise BadInput(f"{folder}: points were computed since the last reduction; `reduce` first")
     cuts = {

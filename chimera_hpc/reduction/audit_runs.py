@@ -13,6 +13,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Integrator
+from chimera_hpc.reduction.conventions import OWN, seen_under
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.schema import scalar_labels
 from chimera_hpc.store.store import Store
@@ -32,8 +33,19 @@ _PIECE = 8
 Task = tuple[Path, Integers, str]
 
 
-class Runs(NamedTuple):
+class Computed(NamedTuple):
     """What n runs came to."""
+
+    status: Integers
+    """(n,)"""
+    scalars: NDArray[np.float64]
+    """(n, quantities), in the order of `scalar_labels`"""
+    steps: Integers
+    """(n,) accepted steps"""
+
+
+class Runs(NamedTuple):
+    """What is compared of n runs, under one convention."""
 
     status: Integers
     """(n,)"""
@@ -43,6 +55,13 @@ class Runs(NamedTuple):
     """(n,) distance of the last state from the centre of the initial states"""
     steps: Integers
     """(n,) accepted steps"""
+
+    @classmethod
+    def of(cls, sweep: Sweep, made: Computed, convention: str = OWN) -> Runs:
+        """Pick out what labels need of the runs of a sweep."""
+        scalars = dict(zip(scalar_labels(sweep), made.scalars.T, strict=True))
+        known, status = seen_under(convention, sweep, scalars, made.status)
+        return runs_of(status, known, made.steps)
 
 
 def variant(sweep: Sweep, way: str) -> tuple[Sweep, float]:
@@ -86,7 +105,7 @@ def compute_again(
     ways: Sequence[str],
     workers: int,
     on_piece: Callable[[int], None] = lambda done: None,
-) -> dict[str, Runs]:
+) -> dict[str, Computed]:
     """Compute points of a store once more in each of the ways.
 
     What comes out does not depend on the number of workers.
@@ -108,20 +127,19 @@ def compute_again(
         for way in ways
     }
     return {
-        way: Runs(*(np.concatenate(columns) for columns in zip(*runs, strict=True)))
+        way: Computed(*(np.concatenate(columns) for columns in zip(*runs, strict=True)))
         for way, runs in by_way.items()
     }
 
 
-def compute_piece(path: Path, chosen: Integers, way: str) -> Runs:
+def compute_piece(path: Path, chosen: Integers, way: str) -> Computed:
     """Compute points of a store in one of the ways, all at once."""
     from chimera_hpc.run.block import run_block
 
     store = Store.open(path)
     sweep, nudge = variant(store.sweep, way)
     made = run_block(sweep, store.points[chosen], nudge=nudge)
-    scalars = dict(zip(scalar_labels(sweep), made.scalars.T, strict=True))
-    return runs_of(made.status, scalars, made.steps)
+    return Computed(made.status, made.scalars, made.steps)
 
 
 def runs_of(status: Integers, scalars: Mapping[str, NDArray[np.float64]], steps: Integers) -> Runs:
@@ -130,7 +148,7 @@ def runs_of(status: Integers, scalars: Mapping[str, NDArray[np.float64]], steps:
     return Runs(status, triplets, scalars.get("distance", np.full(len(status), np.nan)), steps)
 
 
-def _in_turn(tasks: Sequence[Task], on_piece: Callable[[int], None]) -> Iterator[Runs]:
+def _in_turn(tasks: Sequence[Task], on_piece: Callable[[int], None]) -> Iterator[Computed]:
     for task in tasks:
         try:
             yield compute_piece(*task)
@@ -141,7 +159,7 @@ def _in_turn(tasks: Sequence[Task], on_piece: Callable[[int], None]) -> Iterator
 
 def _side_by_side(
     tasks: Sequence[Task], workers: int, on_piece: Callable[[int], None]
-) -> Iterator[Runs]:
+) -> Iterator[Computed]:
     from distributed.scheduler import KilledWorker
 
     from chimera_hpc.run.local_cluster import local_cluster
@@ -154,7 +172,7 @@ def _side_by_side(
         for task, future in zip(tasks, futures, strict=True):
             error = future.exception()
             if isinstance(error, KilledWorker):
-                yield _lost(len(task[1]))
+                yield _lost(task)
             elif error is not None:
                 raise _trouble(task, error)
             else:
@@ -170,7 +188,7 @@ def _trouble(task: Task, error: BaseException) -> BadInput:
     return BadInput(f"{task[0]}: points {task[1].tolist()}: {text}")
 
 
-def _lost(n: int) -> Runs:
-    nothing = np.full((n, 4), np.nan)
+def _lost(task: Task) -> Computed:
+    n, width = len(task[1]), len(scalar_labels(Store.open(task[0]).sweep))
     status = np.full(n, Status.WORKER_LOST, dtype=np.int64)
-    return Runs(status, nothing[:, :3], nothing[:, 3], np.zeros(n, dtype=np.int64))
+    return Computed(status, np.full((n, width), np.nan), np.zeros(n, dtype=np.int64))

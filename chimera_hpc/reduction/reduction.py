@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.files import remove_leftovers, temporary_name, write_atomically
-from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.modes import run_names
@@ -21,12 +20,14 @@ from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.caveat import caveats
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
+from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
 from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
 from chimera_hpc.reduction.selection import check_selections
 from chimera_hpc.reduction.table import class_table
 from chimera_hpc.store.labelled import STORE_NAME
+from chimera_hpc.store.reduction import write_reduction
 from chimera_hpc.store.schema import sample_times
 from chimera_hpc.store.store import Store
 
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from chimera_hpc.plot.figure_input import FigureInput
 
 RESULTS, FIGURES = "results.json", "figures"
+_OF_RUNS = {"space_time", "indicators", "incoherence"}
+"""Figures that show runs with their features."""
 
 Say = Callable[[str], None]
 
@@ -68,6 +71,7 @@ def reduce_sweep(
     Writes the store's group ``reduction``, results.json and the folder figures. A store that is
     not finished is reduced as far as it is done, and one without a run that oscillates too. Killed
     at any moment, each file is whole, old or new, and another reduction puts all of them right.
+    What the panel measures under another convention is reduced too (see `conventions`).
 
     Parameters
     ----------
@@ -88,12 +92,13 @@ def reduce_sweep(
     """
     folder = Path(folder)
     store = Store.open(folder / STORE_NAME)
-    work = _Work(folder, store, say)
-    work.classify(curves, claims)
-    figures = work.draw() if make_figures and work.unwritten is None else ()
-    work.tell(figures)
-    if work.unwritten is not None:
-        raise work.unwritten
+    for convention in reversed(conventions(store.sweep)):
+        work = _Work(folder, store, say, convention)
+        work.classify(curves, claims)
+        figures = work.draw() if make_figures and work.unwritten is None else ()
+        work.tell(figures)
+        if work.unwritten is not None:
+            raise work.unwritten
     return Summary(
         points=work.results["points"],
         table=work.table,
@@ -107,14 +112,17 @@ def reduce_sweep(
 class _Work:
     """One reduction under way."""
 
-    def __init__(self, folder: Path, store: Store, say: Say) -> None:
+    def __init__(self, folder: Path, store: Store, say: Say, convention: str) -> None:
         check_selections(store.sweep, store.points)
         self.folder, self.store, self._say = folder, store, say
+        self.convention, self.place = convention, folder / convention
         self.notes: list[str] = []
         self.unwritten: OSError | None = None
-        self.ledger = store.ledger()
-        self.status = self.ledger["status"]
-        self.scalars, self.quality = store.scalars(), store.quality()
+        ledger, self.quality = store.ledger(), store.quality()
+        self.scalars, self.status = seen_under(
+            convention, store.sweep, store.scalars(), ledger["status"]
+        )
+        self.ledger = {**ledger, "status": self.status}
         self.triplets = np.stack([self.scalars[name] for name in TRIPLET], axis=1)
         axes = [name for name in store.points.axes if name != "seed"]
         self.axes: list[FreeAxis] = free_axes(store.points.cells()[1], axes)
@@ -149,13 +157,12 @@ class _Work:
             store.sweep, self.status, self.scalars, self.quality, made.cuts
         )
         self.curves = self.results["curves"]
-        audit, line = kept_audit(self.folder, self._basis)
+        audit, line = kept_audit(self.place, self._basis)
         self.results |= audit
         if line:
             self.note(line)
         try:
-            store.write_reduction(*self._variables())
-            write_atomically(self.folder / RESULTS, to_json(self.results).encode())
+            self._write()
         except OSError as error:
             # What was found is said all the same.
             self.unwritten = error
@@ -167,6 +174,14 @@ class _Work:
             self.axes,
             {name for k in self.cuts for name in poor_classes(made.cuts[k], r_squared)},
         )
+
+    def _write(self) -> None:
+        if self.convention == OWN:
+            self.store.write_reduction(*self._variables())
+        else:
+            self.place.mkdir(exist_ok=True)
+            write_reduction(self.place, *self._variables())
+        write_atomically(self.place / RESULTS, to_json(self.results).encode())
 
     def _basis(self) -> Basis:
         cuts = {k: (cut.labels, cut.names) for k, cut in self.classification.cuts.items()}
@@ -188,7 +203,7 @@ class _Work:
 
             return sample_times(store.sweep), series_of(store, i)
 
-        self.atlases = atlases_of(self.folder, spec.atlas, self.note)
+        self.atlases = atlases_of(self.folder, spec.atlas, self.note, self.convention)
         given = AnalysisInput(
             sweep=store.sweep,
             points=store.points,
@@ -238,6 +253,8 @@ class _Work:
 
         asked = self.store.sweep.reduction.figures
         makers = choose(asked, self.cuts)
+        if self.convention != OWN:  # the features that are kept are not those of this convention
+            makers = {name: make for name, make in makers.items() if name not in _OF_RUNS}
         outcome = self._outcome(makers)
         drawn: dict[str, Maker] = {}
         for name, make in makers.items():
@@ -245,7 +262,7 @@ class _Work:
                 self.note(f"figure {name}: this sweep has no such cut")
             else:
                 drawn[name] = make
-        made = _write_figures(self.folder, drawn, outcome)
+        made = _write_figures(self.place, drawn, outcome)
         for name in drawn if asked != "auto" else ():
             if not any(path.stem == name for path in made):
                 self.note(f"figure {name}: this sweep has nothing for it to show")
@@ -260,9 +277,8 @@ class _Work:
         first = made.cuts[self.cuts[0]]
         runs = run_names(first.labels, self.status, first.names)
         for atlas in list(self.atlases.values())[:1]:  # the judge's names, where there is one
-            verdicts = zip(atlas.classify(self.triplets).name, runs, self.status, strict=True)
-            runs = [name if code == Status.DONE else run for name, run, code in verdicts]
-        needs_runs = {"space_time", "indicators", "incoherence"} & set(names)
+            labels = np.where(first.labels >= 0, atlas.classify(self.triplets).label, -1)
+            runs = run_names(labels, self.status, atlas.names)
         return FigureInput(
             classification=made,
             triplets=self.triplets,
@@ -270,9 +286,11 @@ class _Work:
             cells={k: self.results["cuts"][str(k)]["cells"] for k in self.cuts},
             curves=self.curves,
             kept=self._kept(),
-            beside=curves_beside(self.folder, store.sweep.reduction.beside, self.note),
+            beside=curves_beside(
+                self.folder, store.sweep.reduction.beside, self.note, self.convention
+            ),
             shown=shown_runs(store, self.status, self.triplets, first, runs, self.axes, self.note)
-            if needs_runs
+            if _OF_RUNS & set(names)
             else (),
             whole=whole_runs(store.sweep, store.points.row(0), self.axes, self.note)
             if "whole_run" in names
@@ -285,16 +303,18 @@ class _Work:
         return {int(k): np.array(shares, dtype=np.float64) for k, shares in found.items()}
 
     def tell(self, figures: Sequence[Path]) -> None:
+        if self.convention != OWN:
+            self._say(f"convention {self.convention}:")
         for line in self.table.splitlines():
             self._say(line)
         for line in self.results["warnings"]:
             self.note(f"warning: {line}")
         self._say(f"store    {self.store.path}")
         if self.unwritten is None:
-            self._say(f"results  {self.folder / RESULTS}")
+            self._say(f"results  {self.place / RESULTS}")
         if figures:
             stems = dict.fromkeys(path.stem for path in figures)
-            self._say(f"figures  {self.folder / FIGURES}: {', '.join(stems)} (PNG and PDF)")
+            self._say(f"figures  {self.place / FIGURES}: {', '.join(stems)} (PNG and PDF)")
 
 
 def _coverage(points: Mapping[str, int]) -> str:

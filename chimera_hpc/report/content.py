@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
-from chimera_hpc.classify.classification import Classification, Cut, classify
+from chimera_hpc.classify.classification import Classification, Cut, classify, has_triplet
 from chimera_hpc.classify.modes import count_votes, modal_votes, vote_labels
 from chimera_hpc.classify.naming import NO_WINDOW, STEADY
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
@@ -170,14 +170,14 @@ def _classified(
         depth=spec.depth,
         names=spec.names,
         largest_tree=largest_tree,
-        known=_known_tree(store, status),
+        known=_known_tree(store, has_triplet(triplets, status)),
     )
 
 
 def _known_tree(
-    store: Store, status: Integers
+    store: Store, clustered: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    """Return linkage and members of the stored reduction, if it saw the same points as done."""
+    """Return linkage and members of the stored reduction, if it clustered the same points."""
     try:
         stored = store.reduction()
     except BadInput:
@@ -185,9 +185,9 @@ def _known_tree(
     cuts = stored.attributes.get("cuts") or [None]
     labels = stored.arrays.get(f"labels_{cuts[0]}")
     same_method = stored.attributes.get("method") == store.sweep.reduction.linkage
-    if labels is None or len(labels) != len(status) or not same_method:
+    if labels is None or len(labels) != len(clustered) or not same_method:
         return None
-    if not np.array_equal(labels >= 0, status == Status.DONE):
+    if not np.array_equal(labels >= 0, clustered):
         return None
     return stored.arrays["linkage"], stored.arrays["members"]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import has_triplet
 from chimera_hpc.reduction.quality import poor_classes
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import looks_of
@@ -27,12 +28,12 @@ class Shown:
     cells: NDArray[np.int64]
     """Numbers of the cells on the map."""
     points: NDArray[np.int64]
-    """Oscillating runs in the projections."""
+    """Clustered runs in the projections."""
 
     @classmethod
     def of(cls, content: Content) -> Shown:
         """Choose them."""
-        runs = np.flatnonzero(content.status == Status.DONE)
+        runs = np.flatnonzero(has_triplet(content.triplets, content.status))
         return cls(thinned(np.arange(content.n_cells), MOST_CELLS), thinned(runs, MOST_POINTS))
 
 

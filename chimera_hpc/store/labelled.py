@@ -96,9 +96,8 @@ def _classes(
         if len(labels) != store.n_points:
             continue  # the sweep was extended since
         names = np.array([*reduction.attributes[f"names_{cut}"], ""])  # ends: steady, no_window, ""
-        own = np.where(
-            status == Status.STEADY, -3, np.where(status == Status.NO_WINDOW, -2, labels)
-        )
+        still = np.where(status == Status.STEADY, -3, np.where(status == Status.NO_WINDOW, -2, -1))
+        own = np.where(labels < 0, still, labels)
         classes[f"class_{cut}"] = (
             "point",
             names[own],

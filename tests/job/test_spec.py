@@ -16,6 +16,7 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import built_in
 from chimera_hpc.job.reading import apply_overrides
 from chimera_hpc.job.tables import TABLES
+from chimera_hpc.measures.conventions import PRESETS
 
 QUICKSTART = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 HEAD = 'name = "x"\nmodel = "topological_fhn"\n'
@@ -142,9 +143,10 @@ OTHER = {
         "time_out": 1.0,
     },
     "features": {
-        "start": 900, "n_peaks": 11, "n_overlap": 4, "window_reference": "own", "reference_node": 1,
+        "preset": None, "start": 900, "n_peaks": 11, "n_overlap": 4, "max_windows": 4,
+        "prominence": 0.1, "window_reference": "own", "reference_node": 1,
         "phase_mean": "arithmetic", "refine": "sine-fit", "time_origin": "absolute",
-        "steady_threshold": 0.1, "groups": 5,
+        "steady": "level", "steady_threshold": 0.1, "groups": 5,
     },
     "fixed": {"n_nodes": 51, "orientation": 2, "epsilon": 0.1, "b": 1, "c": -1, "flips": 1},
     "grid": {"P": "2:23", "Q": "0:P", "seeds": 19},
@@ -314,3 +316,39 @@ def test_an_error_is_one_line_with_file_and_override():
         f"{QUICKSTART} with --set 'P=2:25': grid.P: 25 is too large, at most 24 is allowed "
         "(2 P must be smaller than n_nodes; n_nodes = 50)"
     )
+
+
+PRINTED = "features.preset=paper-printed"
+
+
+def test_a_preset_sets_several_keys_and_each_can_be_overridden():
+    sweep = diagonal(PRINTED, "features.max_windows=6")
+    found = sweep.features
+    assert (found.window_reference, found.phase_mean, found.time_origin) == (
+        "own",
+        "arithmetic",
+        "recording",
+    )
+    assert (found.max_windows, found.prominence, found.steady) == (6, 0.1, "level")
+    assert Sweep.from_dict(sweep.to_dict()) == sweep
+
+
+def test_a_preset_on_the_command_line_replaces_what_the_job_file_says():
+    sweep = Sweep.load(QUICKSTART, (PRINTED, "features.max_windows=5"))
+    assert (sweep.features.window_reference, sweep.features.max_windows) == ("own", 5)
+
+
+def test_the_digest_holds_what_a_preset_sets_and_not_its_name():
+    plain = diagonal()
+    assert diagonal("features.preset=default", "features.max_windows=0").digest == plain.digest
+    preset = diagonal(PRINTED)
+    spelt = diagonal(
+        *(f"features.{k}={json.dumps(v)}" for k, v in PRESETS["paper-printed"].items())
+    )
+    assert preset.digest == spelt.digest != plain.digest
+    assert preset.explain_difference(spelt) == []
+
+
+def test_an_unknown_preset_is_refused_in_one_line():
+    with pytest.raises(BadInput, match=r"features\.preset = 'paper': it should be 'default' or"):
+        diagonal("features.preset=paper")

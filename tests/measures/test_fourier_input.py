@@ -33,7 +33,7 @@ def broken(array, index, value):
         ),
         (T, U, {"phase_mean": "mean"}, "phase_mean must be one of circular, arithmetic"),
         (T, U, {"refine": "no"}, "refine must be one of parabola, sine-fit"),
-        (T, U, {"time_origin": "0"}, "time_origin must be one of window, absolute"),
+        (T, U, {"time_origin": "0"}, "time_origin must be one of window, recording, absolute"),
         (T, U, {"steady_threshold": -1.0}, "steady_threshold must be a finite number >= 0"),
         (T, U, {"steady_threshold": float("nan")}, "steady_threshold must be"),
         (T[:-1], U, {}, r"t must have shape \(2001,\), one time a row of u, not \(2000,\)"),

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.base.status import Status
 from chimera_hpc.measures.fourier import measure_signals
 from chimera_hpc.measures.synthetic import profile_error, synthetic_profiles, synthetic_signal
 from chimera_hpc.measures.windows import maxima, windows
@@ -22,12 +21,12 @@ _LEVELS = (0.0, 2.5, 25.0, 50.0, 75.0, 97.5, 100.0)
 
 
 def variations(given: AnalysisInput) -> dict[str, Any]:
-    """Quantiles of V_theta, V_a, V_Omega and sigma_1 over the oscillating runs of each cell."""
+    """Quantiles of V_theta, V_a, V_Omega and sigma_1 over the clustered runs of each cell."""
     given.need_runs()
     names = (*TRIPLET, "sigma_1")
     rows = []
     for i in range(given.n_cells):
-        runs = (given.cell == i) & (given.status == Status.DONE)
+        runs = (given.cell == i) & given.clustered
         row: dict[str, Any] = {**given.place(i), "runs": int(runs.sum())}
         for name in names if runs.any() else ():
             row[name] = np.percentile(given.scalar(name)[runs], _LEVELS)

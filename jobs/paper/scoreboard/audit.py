@@ -9,6 +9,7 @@ from typing import Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.reduction.audit import Sample, audit_sweep
 from chimera_hpc.reduction.audit_runs import WAYS
+from chimera_hpc.reduction.results import read_results
 from chimera_hpc.store.labelled import STORE_NAME
 from scoreboard.plan import JOBS
 
@@ -38,6 +39,12 @@ def audit_jobs(
         else:
             say(f"audit {name}: {_line(found[name])}")
     return found
+
+
+def audits_under(folder: Path, names: Sequence[str], convention: str) -> dict[str, Any]:
+    """Return what `audit_jobs` found of the labels under another convention, by the same runs."""
+    read = {name: read_results(folder / name / convention / "results.json") for name in names}
+    return {name: results["audit"] for name, results in read.items()}
 
 
 def _line(entry: dict[str, Any]) -> str:

@@ -16,9 +16,13 @@ HEADS = {
 
 
 def audit_text(audit: Mapping[str, Any]) -> str:
+    """Return what is done, and the two tables."""
+    return f"{_INTRODUCTION}\n{audit_tables(audit)}"
+
+
+def audit_tables(audit: Mapping[str, Any]) -> str:
     """Return the two tables."""
-    tables = (jobs_table(audit), chimeras_line(audit), _POINTS, points_table(audit))
-    return "\n".join((_INTRODUCTION, *tables))
+    return "\n".join((jobs_table(audit), chimeras_line(audit), _POINTS, points_table(audit)))
 
 
 _INTRODUCTION = f"""\

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,8 @@ from chimera_hpc.base.errors import BadInput
 from scoreboard.evidence import Evidence, Missing
 from scoreboard.rules import NOT_DECIDABLE, NOT_REPRODUCED, REPRODUCED, RULES, Finding
 
+DEFAULT = "default"
+"""The convention of the jobs as they are."""
 _KEYS = {"id", "where", "says", "rule", "command", "check", "args", "quick"}
 
 
@@ -54,50 +56,70 @@ def read_claims(path: str | Path) -> list[PaperClaim]:
     return claims
 
 
-def scoreboard(claims: Iterable[PaperClaim], evidence: Evidence) -> list[dict[str, Any]]:
+def scoreboard(
+    claims: Iterable[PaperClaim], evidence: Evidence, others: Mapping[str, Evidence] | None = None
+) -> list[dict[str, Any]]:
     """Judge every claim: rows as results.json holds them under ``claims``.
 
     ``reproduced`` is true, false, or None where it can't be decided; ``measured`` then says why.
+    What the same rule finds under other conventions stands under their names.
     """
-    answer = {REPRODUCED: True, NOT_REPRODUCED: False, NOT_DECIDABLE: None}
-    rows = []
-    for claim in claims:
-        found = claim.judge(evidence)
-        interval = None if found.low is None else [found.low, found.high]
-        rows.append(
-            {
-                "id": claim.id,
-                "where": claim.where,
-                "paper": claim.says,
-                "rule": claim.rule,
-                "command": claim.command,
-                "measured": found.measured,
-                "interval": interval,
-                "outcome": found.outcome,
-                "reproduced": answer[found.outcome],
-            }
-        )
-    return rows
+    return [
+        {
+            "id": claim.id,
+            "where": claim.where,
+            "paper": claim.says,
+            "rule": claim.rule,
+            "command": claim.command,
+            **_found(claim, evidence),
+            **{name: _found(claim, other) for name, other in (others or {}).items()},
+        }
+        for claim in claims
+    ]
 
 
-def summary(rows: Sequence[dict[str, Any]]) -> str:
+def _found(claim: PaperClaim, evidence: Evidence) -> dict[str, Any]:
+    found = claim.judge(evidence)
+    return {
+        "measured": found.measured,
+        "interval": None if found.low is None else [found.low, found.high],
+        "outcome": found.outcome,
+        "reproduced": {REPRODUCED: True, NOT_REPRODUCED: False, NOT_DECIDABLE: None}[found.outcome],
+    }
+
+
+def finding(row: Mapping[str, Any], convention: str = DEFAULT) -> Mapping[str, Any]:
+    """Return what was found of a claim under a convention."""
+    found: Mapping[str, Any] = row if convention == DEFAULT else row[convention]
+    return found
+
+
+def summary(rows: Sequence[dict[str, Any]], convention: str = DEFAULT) -> str:
     """Return one line: how many claims have which outcome."""
-    count = Counter(row["outcome"] for row in rows)
+    count = Counter(finding(row, convention)["outcome"] for row in rows)
     outcomes = (REPRODUCED, NOT_REPRODUCED, NOT_DECIDABLE)
     return f"{len(rows)} claims: " + ", ".join(f"{count[name]} {name}" for name in outcomes)
 
 
-def markdown(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the scoreboard as a Markdown table."""
-    head = ["claim", "where", "the paper", "rule", "measured", "95 % interval", "outcome"]
+def _shown(found: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[str]:
+    """Return two cells: what was measured, unless it is what `first` has, and the outcome."""
+    measured, interval = found["measured"], found["interval"]
+    if interval is not None:
+        measured += f" ({interval[0]:.2f} to {interval[1]:.2f})"
+    if first is not None and all(found[key] == first[key] for key in ("measured", "interval")):
+        measured = "the same"
+    return [measured, found["outcome"] if found["reproduced"] else f"**{found['outcome']}**"]
+
+
+def markdown(rows: Sequence[dict[str, Any]], others: Sequence[str] = ()) -> str:
+    """Return the scoreboard as a Markdown table: two columns for each convention."""
+    names = [DEFAULT, *(name for name in others if rows and name in rows[0])]
+    head = ["claim", "where", "the paper", "rule"]
+    head += [f"{name}: {what}" for name in names for what in ("measured", "outcome")]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for row in rows:
-        interval = row["interval"]
-        ends = "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
-        outcome = row["outcome"] if row["reproduced"] else f"**{row['outcome']}**"
-        cells = [
-            *(row[key] for key in ("id", "where", "paper", "rule", "measured")),
-            *(ends, outcome),
-        ]
+        cells = [row[key] for key in ("id", "where", "paper", "rule")]
+        for name in names:
+            cells += _shown(finding(row, name), None if name == DEFAULT else row)
         lines.append("| " + " | ".join(str(cell).replace("|", "/") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

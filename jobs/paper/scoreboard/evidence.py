@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc.job.points import ULPS
+from chimera_hpc.reduction.conventions import OWN
 from chimera_hpc.reduction.results import read_results
+from scoreboard.plan import TRIPLETS
 
 Cell = Mapping[str, Any]
 
@@ -19,16 +21,21 @@ class Missing(Exception):
 
 
 class Evidence:
-    """Results of jobs in folders beside each other, by the names of the jobs."""
+    """Results of jobs in folders beside each other, by the names of the jobs.
 
-    def __init__(self, folder: str | Path) -> None:
-        self.folder = Path(folder)
+    With a convention, those under it, where a job's results depend on it.
+    """
+
+    def __init__(self, folder: str | Path, convention: str = OWN) -> None:
+        self.folder, self.convention = Path(folder), convention
         self._known: dict[str, dict[str, Any]] = {}
 
     def job(self, name: str) -> dict[str, Any]:
         """Return results.json of a job; Missing when there is none, or points are pending."""
         if name not in self._known:
-            path = self.folder / name / "results.json"
+            path = self.folder / name / self.convention / "results.json"
+            if not path.exists() and name not in TRIPLETS:
+                path = self.folder / name / "results.json"
             if not path.exists():
                 raise Missing(f"the job {name} has not been run")
             self._known[name] = read_results(path)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.registry import DEFAULT_PANEL
 from chimera_hpc.job.shipped import jobs_folder
 
 JOBS = (
@@ -30,6 +32,16 @@ JOBS = (
 )
 """A job comes after those whose atlas it asks for."""
 
+TRIPLETS = tuple(
+    name
+    for name in JOBS
+    if name not in ("networks", "networks-2", "synthetic", "stability", "basin", "basin-200")
+)
+"""Jobs whose claims stand on triplets. Those of the others do not depend on the convention."""
+PRINTED = "paper-printed"
+"""The second convention that the claims are judged by, next to the default."""
+_PANEL = f"measures.panel={json.dumps([*DEFAULT_PANEL, PRINTED])}"
+
 QUICK: dict[str, tuple[str, ...]] = {
     "diagonal": ("seeds=5",),
     "orientation2": ("P=[9,12,13,14,15,17,18,22]", "seeds=3"),
@@ -51,6 +63,11 @@ QUICK: dict[str, tuple[str, ...]] = {
 """Overrides of --quick."""
 
 
+def settings(name: str, quick: bool) -> tuple[str, ...]:
+    """Return the overrides of a job: both conventions are measured of the same runs."""
+    return (*((_PANEL,) if name in TRIPLETS else ()), *(QUICK.get(name, ()) if quick else ()))
+
+
 def job_files(folder: str | Path) -> dict[str, Path]:
     """Return the job files by their names."""
     return {name: Path(folder) / f"{name}.toml" for name in JOBS}
@@ -63,4 +80,4 @@ def needs(name: str) -> tuple[str, ...]:
 
 def load(name: str, folder: str | Path, quick: bool = False) -> Sweep:
     """Return the sweep of a job."""
-    return Sweep.load(job_files(folder)[name], QUICK.get(name, ()) if quick else ())
+    return Sweep.load(job_files(folder)[name], settings(name, quick))

@@ -18,10 +18,10 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.job.shipped import jobs_folder
 from chimera_hpc.reduction.atlases import load_atlas
-from scoreboard.audit_text import audit_text
-from scoreboard.claims import markdown, read_claims, scoreboard, summary
+from scoreboard.audit_text import audit_tables, audit_text
+from scoreboard.claims import DEFAULT, finding, markdown, read_claims, scoreboard, summary
 from scoreboard.evidence import Evidence
-from scoreboard.plan import JOBS, QUICK, needs
+from scoreboard.plan import JOBS, PRINTED, TRIPLETS, needs, settings
 
 _ATLASES = ("diagonal", "orientation2")
 
@@ -34,11 +34,15 @@ and the figures; `--quick` thins the grids, `--only JOB,...` runs some jobs, `--
 what there is. Rules were fixed before the jobs were run; none was changed to suit a result, but for
 one that had counted slow motion without an oscillation as an oscillation (sec. moredetdyn), which
 now has a claim of its own. Fractions have Wilson 95 % intervals.
+
+Every claim is judged twice, by the same runs and the same rule: under the default convention of the
+Fourier features, and under `paper-printed` ([the method](method.md)). Each convention is applied to
+the whole board. Claims that do not depend on it have one measurement, and the same outcome twice.
 """
 _TRIED = "tried.md"
 """Beside the claims: what was tried of those that do not reproduce."""
 
-_KEPT = ("audit", "seconds", "cost")
+_KEPT = ("audit", "audit_printed", "seconds", "cost")
 
 Say = Callable[[str], None]
 
@@ -58,11 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     times = run_jobs(names, folder, args.quick, args.workers, print)
     failed = [name for name, (status, _) in times.items() if status]
     audit: dict[str, Any] = {}
+    under: dict[str, Any] = {}
     if not args.no_audit and not failed and names:
-        from scoreboard.audit import audit_jobs
+        from scoreboard.audit import audit_jobs, audits_under
 
         audit = audit_jobs(folder, names, args.share, args.workers, print)
-    rows = scoreboard(read_claims(args.jobs / "claims.toml"), Evidence(folder))
+        under = audits_under(folder, [name for name in audit if name in TRIPLETS], PRINTED)
+    claims = read_claims(args.jobs / "claims.toml")
+    rows = scoreboard(claims, Evidence(folder), {PRINTED: Evidence(folder, PRINTED)})
     spent = cost(time.monotonic() - began)
     tried = args.jobs / _TRIED
     made = {
@@ -70,14 +77,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "quick": args.quick,
         "claims": rows,
         "audit": audit,
+        "audit_printed": under,
         "seconds": {name: seconds for name, (_, seconds) in times.items()},
         "cost": spent | {"jobs": len(names)} if names else {},
     }
     write_scoreboard(folder, made, tried.read_text() if tried.is_file() else "")
-    print(summary(rows))
-    for row in rows:
-        if row["reproduced"] is False:
-            print(f"  not reproduced: {row['id']}: {row['measured']}")
+    for convention in (DEFAULT, PRINTED):
+        print(f"{convention}: {summary(rows, convention)}")
+        for row in rows:
+            found = finding(row, convention)
+            if found["reproduced"] is False:
+                print(f"  not reproduced: {row['id']}: {found['measured']}")
     print(f"scoreboard  {folder / 'claims.md'}, {folder / 'results.json'}")
     print(f"{spent['minutes']:.1f} minutes, {spent['cpu_minutes']:.1f} of processor time")
     for name in failed:
@@ -160,12 +170,12 @@ def _run(
 ) -> tuple[str, tuple[int, float]]:
     began = time.monotonic()
     place = ["--cluster", "serial"] if quick else ["--workers", str(workers)]
-    settings = [word for text in (QUICK.get(name, ()) if quick else ()) for word in ("--set", text)]
+    changes = [word for text in settings(name, quick) for word in ("--set", text)]
     job = jobs_folder() / "paper" / f"{name}.toml"
     command = [sys.executable, "-P", "-m", "chimera_hpc.sweep", "run", str(job)]
     with (folder / f"{name}.log").open("w") as log:
         ended = subprocess.run(
-            [*command, "--out", str(folder / name), *place, *settings],
+            [*command, "--out", str(folder / name), *place, *changes],
             stdout=log,
             stderr=subprocess.STDOUT,
             check=False,
@@ -196,14 +206,18 @@ def write_scoreboard(folder: Path, made: dict[str, Any], notes: str = "") -> Non
     # A call that only judges, or runs some jobs, keeps what is known of the others.
     try:
         known = json.loads((folder / "results.json").read_text())
-        made = made | {key: known.get(key, {}) | made[key] for key in _KEPT}
+        made = made | {key: known.get(key, {}) | made.get(key, {}) for key in _KEPT}
     except (OSError, ValueError, AttributeError, TypeError, RecursionError):
         pass
     write_atomically(folder / "results.json", to_json(made).encode())
-    parts = [_HEAD, f"{summary(made['claims'])}.\n", *_cost_line(made["cost"])]
-    parts.append(markdown(made["claims"]))
+    sums = [f"- {name}: {summary(made['claims'], name)}." for name in (DEFAULT, PRINTED)]
+    parts = [_HEAD, *sums, "", *_cost_line(made["cost"])]
+    parts.append(markdown(made["claims"], [PRINTED]))
     if made["audit"]:
         parts.append(f"## Audit of the labels\n\n{audit_text(made['audit'])}")
+    if made.get("audit_printed"):
+        text = audit_tables(made["audit_printed"])
+        parts.append(f"## Audit of the labels under {PRINTED}\n\n{text}")
     text = "\n".join([*parts, notes] if notes else parts)
     write_atomically(folder / "claims.md", text.encode())
 
