@@ -31,6 +31,7 @@ from chimera_hpc.base.renaming import accepts_old_names
 from chimera_hpc.base.status import Status
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures import lines, windows
+from chimera_hpc.measures.averages import average
 from chimera_hpc.measures.checks import Array, choice, node_rows
 from chimera_hpc.measures.conventions import (
     PhaseMean,
@@ -250,7 +251,7 @@ def measure_signals(
     if found.status is Status.DONE:
         n_windows = int(found.counts.min())
         values = np.stack([getattr(found, name) for name in _COLUMNS])
-        _average(values, found.counts, phase_mean == "circular", out)
+        average(values, found.counts, phase_mean == "circular", out)
     elif steady == "level":
         out[: len(QUANTITIES)] = 0.0
         out[QUANTITIES.index("baseline")] = node_rows("u", u).mean(axis=1)
@@ -356,51 +357,6 @@ def _fill_lines(
                 bins[j] = lines.window_line(
                     x[j], first[c, m], n, bins[j], refine, work, values[j, m]
                 )
-
-
-@jit()
-def _average(values: Any, counts: Any, circular: bool, out: Any) -> None:
-    """Write means and standard deviations over windows of values (5, N, q) into out (9, N).
-
-    Of the last row, R^2, only the mean.
-    """
-    for j in range(values.shape[1]):
-        q = counts[j % counts.size]
-        for row in range(4):
-            x = values[row, j, :q]
-            around = circular and row == _PHASE
-            mean = _circular_mean(x) if around else _mean(x)
-            square = 0.0
-            for m in range(q):
-                deviation = x[m] - mean
-                if around:
-                    deviation -= 2.0 * math.pi * math.floor(0.5 * deviation / math.pi + 0.5)
-                square += deviation * deviation
-            out[row, j] = mean
-            out[row + 4, j] = math.sqrt(square / (q - 1)) if q > 1 else math.nan
-        out[8, j] = _mean(values[4, j, :q])
-
-
-@jit()
-def _mean(x: Any) -> float:
-    """Return the mean of x, which is exact if all values are equal."""
-    origin = x[0]
-    total = 0.0
-    for m in range(x.size):
-        total += x[m] - origin
-    mean: float = origin + total / x.size
-    return mean
-
-
-@jit()
-def _circular_mean(x: Any) -> float:
-    """Return the argument of the mean of exp(i x), in [-pi, pi); 0 if that mean is zero."""
-    along, across = 0.0, 0.0
-    for m in range(x.size):
-        along += math.cos(x[m])
-        across += math.sin(x[m])
-    mean = math.atan2(across, along)
-    return mean if mean < math.pi else -math.pi
 
 
 def _mean_deviation(x: Array) -> float:

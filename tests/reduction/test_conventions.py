@@ -12,7 +12,8 @@ from jobs_for_tests import SMALL, job_text
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.registry import DEFAULT_PANEL
-from chimera_hpc.measures.fourier import fourier_features
+from chimera_hpc.measures.conventions import PRESETS
+from chimera_hpc.measures.fourier import measure_signals
 from chimera_hpc.measures.variation import total_variations
 from chimera_hpc.recordings.judge import Judge
 from chimera_hpc.reduction.audit import Sample, audit_sweep
@@ -49,7 +50,7 @@ def test_the_second_triplet_is_that_of_the_stored_series(both: Path) -> None:
     for i in range(store.n_points):
         u = store.series(i)
         t = 30.0 + step * np.arange(len(u))
-        found = fourier_features(t, u, n_peaks=3, n_overlap=1, preset="paper-printed")
+        found = measure_signals(t, u, n_peaks=3, n_overlap=1, **PRESETS["paper-printed"])
         stored = [scalars[f"V_{name}_printed"][i] for name in ("theta", "a", "Omega")]
         assert stored == pytest.approx(total_variations(found), abs=1e-9)
         assert scalars["status_printed"][i] == found.status
