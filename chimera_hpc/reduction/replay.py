@@ -148,7 +148,7 @@ def window_spectrum(
     if not 0 <= node < u.shape[1]:
         raise BadInput(f"--node {node}: allowed is 0 to {u.shape[1] - 1}")
     options = settings.options()
-    del options["phase_mean"]
+    del options["phase_mean"], options["steady"]
     lines = window_lines(t, u, **options)
     row = node if settings.window_reference == "own" else 0
     count = int(lines.counts[row])
@@ -160,7 +160,7 @@ def window_spectrum(
     amplitude = 2.0 / len(y) * np.abs(np.fft.rfft(samples))
     frequency = np.fft.rfftfreq(len(y), (t[-1] - t[0]) / (len(t) - 1))
     found = {k: float(getattr(lines, k)[place]) for k in ("amplitude", "frequency", "phase")}
-    origin = 0.0 if settings.time_origin == "absolute" else t[part][0]
+    origin = {"absolute": 0.0, "recording": t[0]}.get(settings.time_origin, t[part][0])
     angle = 2.0 * np.pi * found["frequency"] * (t[part] - origin) + found["phase"]
     fit = lines.baseline[place] + found["amplitude"] * np.cos(angle)
     peak = 1 + int(amplitude[1:].argmax())
