@@ -13,7 +13,8 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.job.schema import job_schema
 from chimera_hpc.job.shipped import jobs_folder
 
-JOBS = [file for file in sorted(jobs_folder().rglob("*.toml")) if file.name != "claims.toml"]
+OTHERS = {"claims.toml", "causes.toml"}
+JOBS = [file for file in sorted(jobs_folder().rglob("*.toml")) if file.name not in OTHERS]
 VALIDATOR = jsonschema.Draft202012Validator(job_schema())
 
 

@@ -41,13 +41,18 @@ def test_malformed_cause_is_refused(tmp_path: Path, text: str, says: str) -> Non
 )
 def test_five_percent_of_the_redrawn_sweeps_make_it_chance(holds: int, kind: str) -> None:
     causes = read_causes(PAPER / "causes.toml", _ids())
-    found = explain("b-6", causes, {"holds": holds, "of": 200})
+    found = explain(
+        "b-6",
+        causes,
+        {"default": {"holds": 0, "of": 200}, "paper-printed": {"holds": holds, "of": 200}},
+    )
     assert found["kind"] == kind
-    assert cause_text(found).startswith(f"{kind}: holds in {holds} of 200 redrawn sweeps. At b = ")
+    counted = f"{kind}: holds in 0 of 200 (default), {holds} of 200 (paper-printed) redrawn sweeps"
+    assert cause_text(found).startswith(f"{counted}. At b = 1.7, 97 of 100 seeds go")
 
 
 def test_claim_without_a_cause_is_said_to_be_unexplained() -> None:
-    assert cause_text(explain("x", {}, None)) == "unexplained"
+    assert cause_text(explain("x", {}, {})) == "unexplained"
     assert cause_text(None) == ""
 
 

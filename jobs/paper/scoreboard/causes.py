@@ -42,19 +42,19 @@ def read_causes(path: str | Path, known: Iterable[str]) -> dict[str, Cause]:
 
 
 def explain(
-    claim: str, causes: Mapping[str, Cause], chance: Mapping[str, int] | None
+    claim: str, causes: Mapping[str, Cause], chance: Mapping[str, Mapping[str, int]]
 ) -> dict[str, Any]:
     """Return the cause of a claim that does not reproduce, as results.json has it.
 
-    `chance` counts in how many of how many redrawn sweeps it holds. From `BY_CHANCE` on the kind
-    is "chance", whatever else was found.
+    `chance` counts by convention in how many of how many redrawn sweeps the claim holds. From
+    `BY_CHANCE` on, under any convention, the kind is "chance", whatever else was found.
     """
     cause = causes.get(claim, Cause("unexplained", ""))
-    by_chance = chance is not None and chance["holds"] >= BY_CHANCE * chance["of"]
+    by_chance = any(count["holds"] >= BY_CHANCE * count["of"] for count in chance.values())
     return {
         "kind": "chance" if by_chance else cause.kind,
         "found": cause.found,
-        "redrawn": None if chance is None else dict(chance),
+        "redrawn": {name: dict(count) for name, count in chance.items()},
     }
 
 
@@ -62,7 +62,10 @@ def cause_text(cause: Mapping[str, Any] | None) -> str:
     """Return one cell of the table."""
     if cause is None:
         return ""
-    drawn = cause["redrawn"]
-    counted = f"holds in {drawn['holds']} of {drawn['of']} redrawn sweeps" if drawn else ""
-    words = ". ".join(part.rstrip(".") for part in (counted, cause["found"]) if part)
-    return f"{cause['kind']}" + (f": {words}" if words else "")
+    drawn = ", ".join(
+        f"{count['holds']} of {count['of']} ({name})" for name, count in cause["redrawn"].items()
+    )
+    parts = [f"holds in {drawn} redrawn sweeps" if drawn else "", *cause["found"].split("\n")]
+    words = " ".join(part for part in parts[1:] if part)
+    told = ". ".join(part.rstrip(".") for part in (parts[0], words) if part)
+    return f"{cause['kind']}: {told}" if told else str(cause["kind"])

@@ -21,11 +21,14 @@ from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.reduction.analyses import analyse
 from chimera_hpc.reduction.analysis_input import AnalysisInput
+from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
 from chimera_hpc.reduction.results import TRIPLET, build_results
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.store import Store
-from scoreboard.claims import PaperClaim
+from scoreboard.causes import Cause, explain
+from scoreboard.claims import DEFAULT, PaperClaim, finding
 from scoreboard.evidence import Evidence, Missing
+from scoreboard.plan import PRINTED
 from scoreboard.rules import NOT_DECIDABLE, REPRODUCED
 
 DRAWS = 200
@@ -41,12 +44,14 @@ class Runs:
     scalars: Mapping[str, NDArray[np.float64]]
 
     @classmethod
-    def read(cls, folder: Path) -> Runs:
-        """Read them; Missing without a store or with points pending."""
+    def read(cls, folder: Path, convention: str = OWN) -> Runs:
+        """Read them, as a convention sees them; Missing without a store."""
         if not (folder / STORE_NAME).is_dir():
             raise Missing(f"the job {folder.name} has not been run")
         store = Store.open(folder / STORE_NAME)
-        return cls(store.sweep, store.points, store.ledger()["status"], store.scalars())
+        under = convention if convention in conventions(store.sweep) else OWN
+        scalars, status = seen_under(under, store.sweep, store.scalars(), store.ledger()["status"])
+        return cls(store.sweep, store.points, status, scalars)
 
     @cached_property
     def cells(self) -> list[NDArray[np.int64]]:
@@ -67,8 +72,10 @@ class Runs:
 class RedrawnEvidence(Evidence):
     """What the jobs would have found with other seeds: one draw of all of them."""
 
-    def __init__(self, folder: str | Path, runs: dict[str, Runs], draw: int) -> None:
-        super().__init__(folder)
+    def __init__(
+        self, folder: str | Path, runs: dict[str, Runs], draw: int, convention: str = OWN
+    ) -> None:
+        super().__init__(folder, convention)
         self._runs, self._draw = runs, draw
         self._classes: dict[str, Classification] = {}
 
@@ -81,7 +88,7 @@ class RedrawnEvidence(Evidence):
 
     def _redrawn(self, name: str) -> tuple[Runs, Classification]:
         if name not in self._runs:
-            self._runs[name] = Runs.read(self.folder / name)
+            self._runs[name] = Runs.read(self.folder / name, self.convention)
         # The same draw of an atlas, whichever job asks for it.
         key = [self._draw, *name.encode()]
         runs = self._runs[name].drawn(np.random.default_rng(key))
@@ -113,7 +120,7 @@ class RedrawnEvidence(Evidence):
 
 
 def chances(
-    claims: Sequence[PaperClaim], folder: str | Path, draws: int = DRAWS
+    claims: Sequence[PaperClaim], folder: str | Path, convention: str = OWN, draws: int = DRAWS
 ) -> dict[str, dict[str, int]]:
     """Return by the claim's id in how many of how many draws it holds.
 
@@ -123,9 +130,31 @@ def chances(
     runs: dict[str, Runs] = {}
     found = {claim.id: {"holds": 0, "of": 0} for claim in claims}
     for draw in range(draws):
-        evidence = RedrawnEvidence(folder, runs, draw)
+        evidence = RedrawnEvidence(folder, runs, draw, convention)
         for claim in claims:
             outcome = claim.judge(evidence)
             found[claim.id]["of"] += outcome.outcome != NOT_DECIDABLE
             found[claim.id]["holds"] += outcome.outcome == REPRODUCED
     return {name: count for name, count in found.items() if count["of"]}
+
+
+def add_causes(
+    rows: Sequence[dict[str, Any]],
+    claims: Sequence[PaperClaim],
+    folder: Path,
+    causes: Mapping[str, Cause],
+    draws: int,
+) -> None:
+    """Give each row that reproduces under no convention its ``cause``.
+
+    Without draws, how often chance would have a claim hold is left out.
+    """
+    names = {DEFAULT: OWN, PRINTED: PRINTED}
+    lost = [row for row in rows if not any(finding(row, name)["reproduced"] for name in names)]
+    failed = {row["id"] for row in lost if row["reproduced"] is False}
+    chosen = [claim for claim in claims if claim.id in failed] if draws else []
+    counts = {name: chances(chosen, folder, names[name], draws) for name in names}
+    for row in rows:
+        if row["id"] in failed:
+            chance = {name: made[row["id"]] for name, made in counts.items() if row["id"] in made}
+            row["cause"] = explain(row["id"], causes, chance)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc.base.errors import BadInput
+from scoreboard.causes import cause_text
 from scoreboard.evidence import Evidence, Missing
 from scoreboard.rules import NOT_DECIDABLE, NOT_REPRODUCED, REPRODUCED, RULES, Finding
 
@@ -116,10 +117,12 @@ def markdown(rows: Sequence[dict[str, Any]], others: Sequence[str] = ()) -> str:
     names = [DEFAULT, *(name for name in others if rows and name in rows[0])]
     head = ["claim", "where", "the paper", "rule"]
     head += [f"{name}: {what}" for name in names for what in ("measured", "outcome")]
+    head += ["cause"]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for row in rows:
         cells = [row[key] for key in ("id", "where", "paper", "rule")]
         for name in names:
             cells += _shown(finding(row, name), None if name == DEFAULT else row)
+        cells.append(cause_text(row.get("cause")))
         lines.append("| " + " | ".join(str(cell).replace("|", "/") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

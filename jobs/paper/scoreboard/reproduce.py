@@ -19,6 +19,8 @@ from chimera_hpc.base.files import write_atomically
 from chimera_hpc.job.shipped import jobs_folder
 from chimera_hpc.reduction.atlases import load_atlas
 from scoreboard.audit_text import audit_tables, audit_text
+from scoreboard.causes import read_causes
+from scoreboard.chance import DRAWS, add_causes
 from scoreboard.claims import DEFAULT, finding, markdown, read_claims, scoreboard, summary
 from scoreboard.evidence import Evidence
 from scoreboard.plan import JOBS, PRINTED, TRIPLETS, needs, settings
@@ -38,9 +40,12 @@ now has a claim of its own. Fractions have Wilson 95 % intervals.
 Every claim is judged twice, by the same runs and the same rule: under the default convention of the
 Fourier features, and under `paper-printed` ([the method](method.md)). Each convention is applied to
 the whole board. Claims that do not depend on it have one measurement, and the same outcome twice.
+
+A claim that reproduces under neither has a cause (`jobs/paper/causes.toml`), and the number of 200
+sweeps with redrawn seeds (a bootstrap of the runs of each cell) in which it holds.
 """
-_TRIED = "tried.md"
-"""Beside the claims: what was tried of those that do not reproduce."""
+_NOTES = "robustness.md"
+"""Next to the claims: what was found of W(Q_r) besides."""
 
 _KEPT = ("audit", "audit_printed", "seconds", "cost")
 
@@ -70,8 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         under = audits_under(folder, [name for name in audit if name in TRIPLETS], PRINTED)
     claims = read_claims(args.jobs / "claims.toml")
     rows = scoreboard(claims, Evidence(folder), {PRINTED: Evidence(folder, PRINTED)})
+    causes = read_causes(args.jobs / "causes.toml", [claim.id for claim in claims])
+    add_causes(rows, claims, folder, causes, 0 if args.quick else args.draws)
     spent = cost(time.monotonic() - began)
-    tried = args.jobs / _TRIED
+    notes = args.jobs / _NOTES
     made = {
         "schema": 1,
         "quick": args.quick,
@@ -81,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "seconds": {name: seconds for name, (_, seconds) in times.items()},
         "cost": spent | {"jobs": len(names)} if names else {},
     }
-    write_scoreboard(folder, made, tried.read_text() if tried.is_file() else "")
+    write_scoreboard(folder, made, notes.read_text() if notes.is_file() else "")
     for convention in (DEFAULT, PRINTED):
         print(f"{convention}: {summary(rows, convention)}")
         for row in rows:
@@ -107,6 +114,13 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N")
     parser.add_argument(
         "--share", type=float, default=0.02, help="share of the points that the audit runs again"
+    )
+    parser.add_argument(
+        "--draws",
+        type=int,
+        default=DRAWS,
+        metavar="N",
+        help="how often the seeds are drawn again for a claim that does not reproduce; 0: not",
     )
     parser.add_argument("--no-audit", action="store_true", help="leave the audit out")
     jobs = jobs_folder() / "paper"
