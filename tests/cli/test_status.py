@@ -71,11 +71,11 @@ def test_json_is_one_object_without_a_map(tmp_path: Path, sweep: Run) -> None:
 def test_map_tells_done_part_failed_and_pending_cells(tmp_path: Path) -> None:
     # Blocks of 4 over cells of 5 seeds: the first cell is whole, the second in part.
     store = filled(tmp_path, blocks=2)
-    assert map_text(store)[:2] == ["P = Q", "2 ● ◐ ·"]
+    assert map_text(store)[:2] == ["P = Q", " ●  ◐  ·"]
     fail(store, 3)
-    assert map_text(store)[:2] == ["P = Q", "2 ● ◐ ✗"]
+    assert map_text(store)[:2] == ["P = Q", " ●  ◐  ✗"]
     assert map_text(store)[-1] == "● done   ◐ in part   ✗ some failed"
-    assert map_text(store, plain=True)[1] == "2 # + !"
+    assert map_text(store, plain=True)[1] == " #  +  !"
 
 
 def test_map_over_two_axes_has_the_second_upwards(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_map_has_the_classes_of_the_results_small_while_runs_are_to_come(tmp_pat
     reduce_sweep(tmp_path)
     classes = json.loads((tmp_path / "results.json").read_text())["cuts"]["3"]["cells"]
     first, second = (cell["class"][0] for cell in classes[:2])
-    expected = f"2 {first.upper()} {second.lower()} ·"
+    expected = f" {first.upper()}  {second.lower()}  ·"
     assert map_text(store)[1] == expected
     assert "small letter" in map_text(store)[-1]
 
@@ -127,7 +127,8 @@ def test_long_axis_is_wrapped(tmp_path: Path) -> None:
     store = filled(tmp_path, "P=3", "Q=P", axis.replace(" = ", "=", 1), "seeds=1")
     lines = map_text(store, 60)
     assert lines[0] == "epsilon"
-    assert lines[1].startswith("   0.01 ●●●")
+    assert lines[1].startswith("●●●")
+    assert lines[2].startswith("0.01")  # each line of cells is over their values
     assert max(map(len, lines)) <= 60
     assert sum(line.count("●") for line in lines[:-1]) == 150
 
@@ -145,7 +146,7 @@ def test_extended_store_has_all_its_cells(tmp_path: Path) -> None:
     from store_tools import small_sweep
 
     store = filled(tmp_path).extend(small_sweep("P=2:5"))
-    assert map_text(store)[1] == "2 ● ● ● ·"
+    assert map_text(store)[1:3] == [" ●  ●  ●  ·", " 2  3  4  5"]
 
 
 def test_colours_only_on_a_terminal_that_wants_them(finished: Path) -> None:
@@ -164,7 +165,7 @@ def test_damaged_results_leave_the_map_without_classes(finished: Path, sweep: Ru
         (finished / "results.json").write_text(text)
         code, out, error = sweep("status", finished)
         assert (code, error) == (0, "")
-        assert "● ● ●" in out
+        assert "●  ●  ●" in out
 
 
 def test_rate_counts_back_to_the_last_pause(tmp_path: Path) -> None:
