@@ -89,10 +89,10 @@ def test_classes_appear_when_the_sweep_is_reduced(tmp_path: Path) -> None:
     console = Console(width=80, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
     view = _View(store.path, console)
     console.print(view.look())
-    assert "● ● ●" in console.export_text()
+    assert "●  ●  ●" in console.export_text()
     reduce_sweep(tmp_path)
     console.print(view.look())
-    assert "● ● ●" not in console.export_text()
+    assert "●  ●  ●" not in console.export_text()
     console.file.close()
     assert view.over
     assert view.exit_status == 0

@@ -79,6 +79,7 @@ def test_signals_that_stand_still_have_their_levels() -> None:
     assert np.isnan(total_variations(fourier_features(T, u))).all()
 
 
+@pytest.mark.filterwarnings("ignore:fourier_features. column 2 of u never changes")
 def test_a_signal_with_too_few_maxima_has_its_level_too() -> None:
     slow = 1.0 + np.cos(2 * np.pi * T / 40)
     u = np.stack([np.cos(2 * np.pi * T), slow, np.full(T.size, 5.0)], axis=1)

@@ -40,8 +40,9 @@ def outcome(n_axes=1, status=Status.DONE, **changes):
     """Nine cells with two runs each: three cells of each class."""
     rng = np.random.default_rng(0)
     triplets = CENTRES[np.repeat([0, 1, 2], 6)] * rng.uniform(0.9, 1.1, (18, 3))
-    made = classify(triplets, np.full(18, int(status)), cuts=(3, 5))
     oscillates = status is Status.DONE
+    triplets[:] = triplets if oscillates else np.nan
+    made = classify(triplets, np.full(18, int(status)), cuts=(3, 5))
     classes = [name if oscillates else "steady" for name in np.repeat(NAMES, 3).tolist()]
     cells = [{"class": name, "votes": {name: 2}} for name in classes]
     columns = [("$P = Q$", np.arange(2, 11)), ("$b$", np.tile([0.1, 0.2, 0.3], 3))]
