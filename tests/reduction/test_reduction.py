@@ -321,7 +321,7 @@ def test_without_a_wish_one_run_of_each_class_is_shown(tmp_path):
         ("$P = Q = 4$, seed 0", "disordered"),
     ]
     np.testing.assert_array_equal(runs[1].features, store.features()[5])
-    np.testing.assert_array_equal(runs[1].u, store.series(5))
+    np.testing.assert_array_equal(runs[1].u[:], store.series(5).T)
     np.testing.assert_allclose(runs[1].triplet, CENTRES[3])
 
 
@@ -349,8 +349,8 @@ def test_run_whose_series_is_not_kept_is_computed_again(tmp_path):
         first, last = store.block(block)
         store.write_block(block, run_block(store.sweep, store.points[first:last]), 1, 1)
         (runs[series],) = loaded(store)
-    assert runs["none"].u.std() > 0.1
-    np.testing.assert_array_equal(runs["none"].u, runs["all"].u)
+    assert runs["none"].u[:].std() > 0.1
+    np.testing.assert_array_equal(runs["none"].u[:], runs["all"].u[:])
     np.testing.assert_array_equal(runs["none"].t, runs["all"].t)
 
 
@@ -365,8 +365,8 @@ def test_replay_begins_at_the_initial_state_and_ends_at_the_end(tmp_path):
     other = small_sweep("P=5", "Q=1", "seeds=[9]")
     row = other.points().row(0)
     u0, _ = initial_state(other, row, build(other, row))
-    np.testing.assert_allclose(run.u[0], u0, atol=1e-9)
-    assert len(run.u) == len(run.t) == 41
+    np.testing.assert_allclose(run.u[:][:, 0], u0, atol=1e-9)
+    assert run.u.shape == (12, len(run.t)) == (12, 41)
 
 
 def test_replay_takes_what_is_not_named_from_the_first_point():
