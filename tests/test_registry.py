@@ -184,7 +184,9 @@ def test_a_wrong_panel_is_refused(panel: Any, said: str) -> None:
 def test_an_analysis_without_its_measure_says_so(tmp_path: Path) -> None:
     measures, grid = {"panel": ["variations"]}, {"P": 2, "Q": 0, "seeds": 2}
     run(tmp_path, measures=measures, grid=grid, reduction={"analyses": ["sigma-l"]})
-    (note,) = [n for n in reduce_sweep(tmp_path, make_figures=False).notes if "analysis" in n]
+    (note,) = [
+        n for n in reduce_sweep(tmp_path, make_figures=False).notes if n.startswith("analysis ")
+    ]
     assert note == "analysis sigma-l: measures.panel has no measure that gives sigma_1"
 
 

@@ -23,7 +23,7 @@ from chimera_hpc.job.models import build
 from chimera_hpc.job.tables import Integrator, Keep
 from chimera_hpc.measures.incoherence import local_sigma, order_parameter, range_of, sigma
 from chimera_hpc.run import block as task
-from chimera_hpc.run.block import run_block, warm_up
+from chimera_hpc.run.block import DoesNotFit, run_block, warm_up
 from chimera_hpc.run.initial_state import initial_state
 from chimera_hpc.store.block_result import failed_block
 from chimera_hpc.store.schema import (
@@ -195,13 +195,16 @@ def test_features_do_not_depend_on_which_series_are_kept():
     assert results[0].scalars.tobytes() == results[1].scalars.tobytes()
 
 
-def test_signals_beyond_the_range_of_int16_are_measured_all_the_same():
+def test_signals_beyond_the_range_of_int16_are_refused_and_float32_holds_them():
     # u follows the cube root of the links' signal: a large b lifts it beyond 3.2767.
-    s = sweep("b=20.0 features.steady_threshold=0.0", seeds(1))
+    settings = "b=20.0 features.steady_threshold=0.0"
+    s = sweep(settings, seeds(1))
+    with pytest.raises(DoesNotFit, match=r"int16 holds it up to 3\.2767 only: set keep.dtype"):
+        run_block(s, s.points())
+    s = sweep(f"{settings} keep.dtype=float32", seeds(1))
     result = run_block(s, s.points())
     assert result.status[0] in (Status.DONE, Status.NO_WINDOW)
-    missing = result.series[0] == MISSING
-    assert 0 < missing.sum() < missing.size
+    assert np.isfinite(result.series[0]).all()
     assert result.scalars[0, scalar_labels(sweep()).index("range_u")] > 2 * 3.2767
 
 

@@ -76,8 +76,8 @@ def looked_at(how: str) -> dict[str, Any]:
 def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() -> None:
     forked, spawned = looked_at("forkserver"), looked_at("spawn")
     assert (forked["server"], spawned["server"]) == (True, False)
-    ours = {"PYTHONWARNINGS"}
-    for name in forked["environment"].keys() | spawned["environment"].keys() - ours:
+    ours = {"PYTHONWARNINGS", "PYTHONSAFEPATH"}
+    for name in (forked["environment"].keys() | spawned["environment"].keys()) - ours:
         assert forked["environment"].get(name) == spawned["environment"].get(name), name
     assert fork_server.ONE_THREAD.items() <= forked["environment"].items()
     assert forked["threads of the server"] == 1

@@ -118,7 +118,7 @@ def test_killed_extension_has_not_happened(store: Store, monkeypatch: Any) -> No
     # The arrays with points; three chunks of each coordinate and one of time; the copy of the
     # root; the root.
     n_columns = len(store.points.columns)
-    last = (n_columns + 4) + (3 * n_columns + 1) + 2
+    last = (n_columns + 5) + (3 * n_columns + 1) + 2
     for allowed in (0, 6, 13, 30, last - 2, last - 1):
         count, stage = 0, allowed
         with pytest.raises(Killed):
