@@ -93,7 +93,11 @@ def _delimiter(lines: list[str]) -> str | None:
     for mark in (";", "\t"):
         if np.mean([mark in line for line in tail]) > _MOST:  # a line of words may end the file
             return mark
-    blanks = all(len(w := line.split()) > 1 and all(map(_COMMA.fullmatch, w)) for line in tail)
+    words = [line.split() for line in tail]
+    # Commas in numbers only, other words without one: dates next to decimal commas.
+    blanks = {len(line) > 1 for line in words} == {True} and all(
+        "," not in word or _COMMA.fullmatch(word) for line in words for word in line
+    )
     return "," if not blanks and np.mean(["," in line for line in tail]) > _MOST else None
 
 

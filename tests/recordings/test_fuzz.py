@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import gzip
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +24,15 @@ ORDERS = ["".join(order) for order in itertools.permutations("dmY")]
 FORMS = ("seconds", "mm:ss", "hh:mm:ss", "iso", "zoned", "compact", "compact ms", "epoch",
          "date and time", "none", *(f"{o}{mark}" for o in ORDERS for mark in "./-"))  # fmt: skip
 DAY = 86400.0
+# An example is a whole table.
+pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
 
 
 @dataclass(frozen=True)
 class Written:
     """A table and what is true of it."""
 
-    text: str = field(repr=False)
+    text: str
     encoding: str
     packed: bool
     step: float | None  # what the user gives
