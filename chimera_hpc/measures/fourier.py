@@ -174,7 +174,7 @@ def fourier_features(
     steady : {"apart", "level"}
         Features of signals that do not oscillate (status STEADY or NO_WINDOW): NaN, or amplitude,
         frequency and phase 0 and the mean in time as baseline. Their triplet of total variations is
-        then (0, mean |<u>_{i+1} - <u>_i|, 0).
+        then (0, mean ``|<u>_{i+1} - <u>_i|``, 0).
     steady_threshold : float
         Limit for the mean over signals of the standard deviation in time of u, in the unit of u.
 
