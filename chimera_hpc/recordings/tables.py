@@ -96,7 +96,9 @@ def _delimiter(lines: list[str]) -> str | None:
     words = [line.split() for line in tail]
     # Commas in numbers only, other words without one: dates next to decimal commas.
     blanks = {len(line) > 1 for line in words} == {True} and all(
-        "," not in word or _COMMA.fullmatch(word) for line in words for word in line
+        "," not in word or _COMMA.fullmatch(word.rpartition(":")[2])
+        for line in words
+        for word in line
     )
     return "," if not blanks and np.mean(["," in line for line in tail]) > _MOST else None
 

@@ -138,7 +138,7 @@ def tables(draw: st.DrawFn) -> Written:
         n_nodes,
         fault,
         names[bad] if named else str(bad),
-        fault == "empty" or (daily and (form[3] != "." or (sep == " " and comma))),
+        fault == "empty" or (daily and form[3] != ".") or (sep == " " and comma),
     )
 
 
