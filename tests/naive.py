@@ -137,7 +137,7 @@ def total_variations(phase, amplitude, frequency):
 
 
 def stands_out(x, peak, prominence):
-    """Whether a maximum is `prominence` above the higher of the lowest points beside it."""
+    """Whether a maximum rises `prominence` above the higher of the lowest points on its sides."""
     lowest = []
     for side in (x[:peak][::-1], x[peak + 1 :]):
         higher = np.flatnonzero(side > x[peak])

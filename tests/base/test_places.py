@@ -13,7 +13,7 @@ import pytest
 from chimera_hpc.base import places
 
 NOWHERE = "/proc/nowhere"
-"""Nobody, not even root, can make a folder there."""
+"""No one, not even root, can make a folder there."""
 CACHE = "from chimera_hpc.integrate.jit import cache_folder; print(cache_folder())"
 STRANGER = ("unshare", "--user", "--map-user=12345", "--map-group=12345")
 """Runs a command under a user id that no list of users has."""

@@ -1,4 +1,4 @@
-"""What is printed cannot be written, or nobody reads it: one line at most, never a traceback."""
+"""What is printed cannot be written, or no one reads it: one line at most, never a traceback."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def test_classes_older_than_the_points_are_left_out(store):
 
 def test_selecting_and_unstacking_the_whole_dataset_reads_no_series(classified: Store) -> None:
     for chunk in (classified.path / "u").glob("c.*"):
-        chunk.write_bytes(b"whoever decodes this fails")
+        chunk.write_bytes(b"no chunk: decoding it fails")
     with chimera_hpc.open(classified.path) as data:
         grid = data.set_index(point=["cell", "seed"]).unstack()
         assert grid.V_theta.dims == ("cell", "seed")

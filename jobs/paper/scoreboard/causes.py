@@ -65,7 +65,6 @@ def cause_text(cause: Mapping[str, Any] | None) -> str:
     drawn = ", ".join(
         f"{count['holds']} of {count['of']} ({name})" for name, count in cause["redrawn"].items()
     )
-    parts = [f"holds in {drawn} redrawn sweeps" if drawn else "", *cause["found"].split("\n")]
-    words = " ".join(part for part in parts[1:] if part)
-    told = ". ".join(part.rstrip(".") for part in (parts[0], words) if part)
+    counted = f"holds in {drawn} redrawn sweeps" if drawn else ""
+    told = ". ".join(part for part in (counted, " ".join(cause["found"].split())) if part)
     return f"{cause['kind']}: {told}" if told else str(cause["kind"])

@@ -77,7 +77,7 @@ class RedrawnEvidence(Evidence):
     ) -> None:
         super().__init__(folder, convention)
         self._runs, self._draw = runs, draw
-        self._classes: dict[str, Classification] = {}
+        self._made: dict[str, tuple[Runs, Classification]] = {}
 
     def job(self, name: str) -> dict[str, Any]:
         """Return what results.json would hold."""
@@ -87,22 +87,24 @@ class RedrawnEvidence(Evidence):
         return self._known[name]
 
     def _redrawn(self, name: str) -> tuple[Runs, Classification]:
-        if name not in self._runs:
-            self._runs[name] = Runs.read(self.folder / name, self.convention)
-        # The same draw of an atlas, whichever job asks for it.
-        key = [self._draw, *name.encode()]
-        runs = self._runs[name].drawn(np.random.default_rng(key))
-        if name not in self._classes:
+        """Return a job's drawn runs and their classes: the same ones whichever job asks."""
+        if name not in self._made:
+            if name not in self._runs:
+                self._runs[name] = Runs.read(self.folder / name, self.convention)
+            runs = self._runs[name].drawn(np.random.default_rng([self._draw, *name.encode()]))
             spec = runs.sweep.reduction
-            self._classes[name] = classify(
-                np.stack([runs.scalars[each] for each in TRIPLET], axis=1),
-                runs.status,
-                linkage=spec.linkage,
-                cuts=spec.cuts,
-                depth=spec.depth,
-                names=spec.names,
+            self._made[name] = (
+                runs,
+                classify(
+                    np.stack([runs.scalars[each] for each in TRIPLET], axis=1),
+                    runs.status,
+                    linkage=spec.linkage,
+                    cuts=spec.cuts,
+                    depth=spec.depth,
+                    names=spec.names,
+                ),
             )
-        return runs, self._classes[name]
+        return self._made[name]
 
     def _results(self, runs: Runs, classes: Classification) -> dict[str, Any]:
         spec = runs.sweep.reduction
