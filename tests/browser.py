@@ -27,7 +27,13 @@ FLAGS = (
     "--disable-dev-shm-usage",
 )
 _START_SECONDS = 30.0
-KEYS = {"ArrowRight": "\ue014", "ArrowUp": "\ue013", "Tab": "\ue004", "Enter": "\ue007"}
+KEYS = {
+    "ArrowLeft": "\ue012",
+    "ArrowUp": "\ue013",
+    "ArrowRight": "\ue014",
+    "Tab": "\ue004",
+    "Enter": "\ue007",
+}
 
 
 class Browser:

@@ -8,9 +8,13 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
+from pathlib import Path
+
+from chimera_hpc.base.places import is_writable
 
 ONE_THREAD = {
     name: "1"
@@ -30,6 +34,8 @@ _HASH_SEED = {"PYTHONHASHSEED": "6640"}
 """The seed that Dask gives each worker process."""
 _SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 """No module of the current folder stands in for a library."""
+_LONGEST_FOLDER = 70
+"""Bytes: the name of a Unix socket holds 104 or more, and multiprocessing adds 32 to a folder's."""
 
 
 def start_fork_server() -> str:
@@ -41,15 +47,28 @@ def start_fork_server() -> str:
     quiet = [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"]
     with _environment({"PYTHONWARNINGS": ",".join(filter(None, quiet))} | _SAFE_PATH):
         resource_tracker.ensure_running()
-    if "forkserver" not in multiprocessing.get_all_start_methods():
+    folder = _folder_for_sockets()
+    if folder is None or "forkserver" not in multiprocessing.get_all_start_methods():
         return "spawn"
     from multiprocessing import forkserver
 
     threads = {name: os.environ.get(name, value) for name, value in ONE_THREAD.items()}
     multiprocessing.set_forkserver_preload(["chimera_hpc.run.preload"])
-    with _environment(threads | _HASH_SEED | _SAFE_PATH), signals_blocked():
-        forkserver.ensure_running()
+    before, tempfile.tempdir = tempfile.tempdir, folder
+    try:
+        with _environment(threads | _HASH_SEED | _SAFE_PATH), signals_blocked():
+            forkserver.ensure_running()
+    finally:
+        tempfile.tempdir = before
     return "forkserver"
+
+
+def _folder_for_sockets() -> str | None:
+    """Return the temporary folder, or ``/tmp`` if its name is too long for that of a socket."""
+    for folder in (tempfile.gettempdir(), "/tmp"):
+        if len(os.fsencode(folder)) <= _LONGEST_FOLDER and is_writable(Path(folder)):
+            return folder
+    return None
 
 
 @contextmanager

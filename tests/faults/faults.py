@@ -309,7 +309,7 @@ def read_only(trial: Trial) -> Finding:
         if code and "Read-only file system" not in child.text():
             trial.problems.append(f"no clear line: {child.text()[-300:]}")
         # Nothing to be repaired there.
-        trial.run("status", trial.out, expect=0)
+        trial.run("status", trial.out, expect=75 if code else 0)
     trial.resume()
     return trial.finding(2 * BLOCK)
 

@@ -90,6 +90,24 @@ def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() ->
         assert found["blocked"] == []
 
 
+@linux
+def test_temporary_folder_with_a_long_name_is_no_obstacle(tmp_path: Path) -> None:
+    folder = tmp_path / ("x" * 90)
+    folder.mkdir()
+    code = """import tempfile
+from chimera_hpc.run.fork_server import start_fork_server
+from multiprocessing.util import get_temp_dir
+print(start_fork_server(), get_temp_dir().startswith(tempfile.gettempdir()))"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"TMPDIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["forkserver", "False"]
+
+
 def test_commands_that_need_no_workers_start_none(
     job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
