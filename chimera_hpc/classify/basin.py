@@ -1,4 +1,4 @@
-"""The stability domain of an equilibrium: f(P, R) of the paper (fig:stability)."""
+"""The stability domain of an equilibrium: f(P, R) of the paper (fig. 2)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From triplets of total variations to named classes (paper, ssec:classific).
+"""From triplets of total variations to named classes (paper, sec. III C).
 
 The triplets (V_theta, V_a, V_Omega) of all runs that have one are scaled to [0, 1] and merged
 bottom-up into one tree. The tree is cut by number of clusters or at a depth threshold d.

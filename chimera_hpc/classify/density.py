@@ -1,4 +1,4 @@
-"""Classes of one scalar from its density: sigma_l of the paper (fig:sigmal)."""
+"""Classes of one scalar from its density: sigma_l of the paper (fig. 23)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The modal class of each cell (paper, ssec:classific: the statistical mode over the seeds)."""
+"""The modal class of each cell (paper, sec. III C: the statistical mode over the seeds)."""
 
 from __future__ import annotations
 

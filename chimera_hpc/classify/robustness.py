@@ -1,4 +1,4 @@
-"""Fractions of runs along a parameter, with Wilson bands: W(Q_r) of the paper (ratio-o1-o2)."""
+"""Fractions of runs along a parameter, with Wilson bands: W(Q_r) of the paper (fig. 19)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Linear stability of the homogeneous equilibria (paper, sec:stabhomeq).
+r"""Linear stability of the homogeneous equilibria (paper, app. A).
 
 About (u*, v*) with v* = -b/c, every singular value b_alpha of B1 has a block
 

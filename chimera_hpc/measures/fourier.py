@@ -1,6 +1,6 @@
 """Amplitude, frequency, phase and baseline of oscillations, window by window (the Fourier method).
 
-In a window, a signal is described by its dominant line (paper, ssec:Fourier and sec:Fourier),
+In a window, a signal is described by its dominant line (paper, sec. III A and app. B),
 
     y(t) ~ a0 + a cos(2 pi Omega (t - t_ref) + theta) .
 
@@ -8,7 +8,7 @@ It is found in three steps. (1) Find the largest line of the amplitude spectrum 
 y - <y>, without padding, taper or bin 0. (2) Omega is the vertex of the parabola through this line
 and its neighbours. (3) Fit p1 cos(2 pi Omega t + p2) + p3 by least squares with Omega fixed, a
 problem that is linear in (p1 cos p2, p1 sin p2, p3). The features are mean and standard deviation
-over the windows (eq:averages, eq:stds). The share of the signal's energy that the fit explains,
+over the windows (eqs. (7), (8)). The share of the signal's energy that the fit explains,
 
     R^2 = 1 - sum_i (y_i - fit_i)^2 / sum_i (y_i - <y>)^2 ,
 
@@ -137,7 +137,7 @@ def fourier_features(
 
     A window runs from a maximum of the reference signal to its (n_peaks - 1)-th next maximum, both
     samples included. Consecutive windows share n_overlap maxima. For q windows and the value Z^(w)
-    of a quantity in window w (eq:averages, eq:stds),
+    of a quantity in window w (eqs. (7), (8)),
 
         <Z> = sum_w Z^(w) / q ,        sigma_Z^2 = sum_w (Z^(w) - <Z>)^2 / (q - 1) .
 

@@ -1,7 +1,7 @@
 r"""Incoherence of neighbours (Gopal et al. 2014) and the order of the whole ring.
 
 Gopal, Chandrasekar, Venkatesan and Lakshmanan, Phys. Rev. E 89, 052914 (2014),
-doi:10.1103/PhysRevE.89.052914; paper, section sec:compS. With z_i = x_i - x_{i+1} around a ring
+doi:10.1103/PhysRevE.89.052914; paper, app. F. With z_i = x_i - x_{i+1} around a ring
 of N nodes and <z> the mean of z over all nodes,
 
     sigma    = < sqrt( sum_i (z_i - <z>)^2 / N ) >_t ,

@@ -21,7 +21,7 @@ class Profiles(NamedTuple):
 
 
 def synthetic_profiles(n_nodes: int = 100) -> Profiles:
-    """Profiles of the paper's synthetic signal (section sec:Fourier, below eq:syntsig).
+    """Profiles of the paper's synthetic signal (app. B, below eq. (B1)).
 
     With s = j / N for the nodes j = 0 .. N-1 (the paper's node j + 1, and N = 100) and
     bump(s) = (s - l) (r - s) in the fifth [l, r] of [0, 1] that holds s,
@@ -46,7 +46,7 @@ def synthetic_profiles(n_nodes: int = 100) -> Profiles:
 
 
 def synthetic_signal(t: ArrayLike, n_nodes: int = 100) -> Array:
-    """Samples (T, N) of x_j(t) = a_0(j) cos(2 pi Omega_0(j) t + theta_0(j)), eq:syntsig.
+    """Samples (T, N) of x_j(t) = a_0(j) cos(2 pi Omega_0(j) t + theta_0(j)), eq. (B1).
 
     t (T,): times; the paper takes [500, 1000].
 

@@ -25,7 +25,7 @@ class HasProfiles(Protocol):
 
 
 def total_variations(features: HasProfiles, *, ring: bool = True) -> tuple[float, float, float]:
-    """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, section ssec:TNVar).
+    """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, sec. III B).
 
     As `total_variation_arrays`, for an object with the attributes phase, amplitude and frequency.
     The result is NaN if the features are NaN, i.e. if their status is not DONE. Features that were
@@ -44,7 +44,7 @@ def total_variation_arrays(
         V_a     = sum_i |a_{i+1} - a_i| / N ,
         V_Omega = sum_i |Omega_{i+1} - Omega_i| / N ,
 
-    where node N+1 is node 1 (paper, section ssec:TNVar). For V_theta, v_i is reduced modulo 2 pi,
+    where node N+1 is node 1 (paper, sec. III B). For V_theta, v_i is reduced modulo 2 pi,
     so phases may be outside [0, 2 pi). V_theta is in [0, 1], V_a has the unit of the signal, and
     V_Omega that of the frequency.
 

@@ -1,6 +1,6 @@
 """Runs at other parameters over the classes of a finished sweep.
 
-Paper fig:hvsnmin:orient:1b (parameter b) and fig:hvsnmin:orient:1a (epsilon).
+Paper fig. 7 (parameter b) and fig. 8 (epsilon).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Diamonds:
 
 
 def atlas_figure(data: FigureInput) -> Figure | None:
-    """Draw a diamond for each cell over the judge's classes (paper fig:hvsnmin:orient:1b, 1a).
+    """Draw a diamond for each cell over the judge's classes (paper figs. 7, 8).
 
     One panel for each value of the first axis, coloured by the second; with one axis, one panel
     that is coloured by it.

@@ -1,4 +1,4 @@
-"""The stability domain f(P, R) as a map (paper fig:stability)."""
+"""The stability domain f(P, R) as a map (paper fig. 2)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from chimera_hpc.plot.figure_input import FigureInput, numbers
 
 
 def basin_figure(data: FigureInput) -> Figure | None:
-    """Draw f(P, R) (paper fig:stability)."""
+    """Draw f(P, R) (paper fig. 2)."""
     entry = data.curves.get("basin")
     if entry is None:
         return None

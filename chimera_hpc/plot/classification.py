@@ -1,6 +1,6 @@
 """The whole classification in one figure: tree, plane, modal classes.
 
-Paper fig:hvsnmin:orient:1, fig:orient1_5classes, fig:hvsnmin:orient:1tri, fig:ourmeth and others.
+Paper figs. 5, 6, 14, 20 and others.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from chimera_hpc.plot.projections import draw_projection
 
 @style.styled
 def classification_figure(data: FigureInput, n_clusters: int) -> Figure | None:
-    """Draw tree, plane (V_theta, V_a), modal classes in a row (paper fig:hvsnmin:orient:1)."""
+    """Draw tree, plane (V_theta, V_a), modal classes in a row (paper fig. 5)."""
     tree, classes = data.classification, data.classes(n_clusters)
     if len(tree.members) < 2 or len(data.axes) not in (1, 2):
         return None

@@ -1,4 +1,4 @@
-"""The tree of merges with the line that cuts it (paper fig:hvsnmin:orient:1, panel a)."""
+"""The tree of merges with the line that cuts it (paper fig. 5, panel a)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STEM = "#777777"
 
 
 def dendrogram_figure(data: FigureInput, n_clusters: int) -> Figure | None:
-    """Draw the tree with the line of a cut (paper fig:hvsnmin:orient:1 a)."""
+    """Draw the tree with the line of a cut (paper fig. 5 a)."""
     tree, cut = data.classification, data.classification.cuts[n_clusters]
     if len(tree.members) < 2:
         return None

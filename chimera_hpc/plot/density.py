@@ -1,4 +1,4 @@
-"""Classes of sigma_l from its density, and along a parameter (paper fig:sigmal)."""
+"""Classes of sigma_l from its density, and along a parameter (paper fig. 23)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Density:
 
 
 def sigma_l_figure(data: FigureInput) -> Figure | None:
-    """Draw histogram and density of sigma_1 with its cuts, and its classes (paper fig:sigmal)."""
+    """Draw histogram and density of sigma_1 with its cuts, and its classes (paper fig. 23)."""
     entry = data.curves.get("sigma-l")
     if entry is None or data.only_axis is None:
         return None

@@ -1,4 +1,4 @@
-"""Strength of incoherence against a parameter (paper fig:theirmeth, fig:Sgoodwrong)."""
+"""Strength of incoherence against a parameter (paper fig. 21, fig. 22)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _KINDS = (("SI = 0", style.RED), ("0 < SI < 1", style.BLUE), ("SI = 1", style.BL
 
 
 def incoherence_figure(data: FigureInput) -> Figure | None:
-    """Draw the median SI for each threshold, and the last run to show (fig:theirmeth)."""
+    """Draw the median SI for each threshold, and the last run to show (fig. 21)."""
     entry = data.curves.get("incoherence")
     if entry is None or not entry["deltas"] or data.only_axis is None:
         return None

@@ -1,4 +1,4 @@
-"""Fourier indicators against the node: phase, amplitude, frequency (paper fig:9fourier)."""
+"""Fourier indicators against the node: phase, amplitude, frequency (paper fig. 4)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from chimera_hpc.plot.raster import bins
 
 
 def indicators_figure(data: FigureInput) -> Figure | None:
-    """Draw the Fourier indicators of the runs to show that oscillate (paper fig:9fourier)."""
+    """Draw the Fourier indicators of the runs to show that oscillate (paper fig. 4)."""
     runs = [(run, run.features) for run in data.shown if run.features is not None]
     if not runs:
         return None

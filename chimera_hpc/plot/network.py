@@ -1,4 +1,4 @@
-"""Drawings of oriented rings (paper fig:orient, fig:orient:3)."""
+"""Drawings of oriented rings (paper fig. 1, fig. 17)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LARGEST_NUMBERED = 24
 
 
 def networks_figure(data: FigureInput) -> Figure | None:
-    """Draw the oriented rings, reoriented links in red (paper fig:orient, fig:orient:3)."""
+    """Draw the oriented rings, reoriented links in red (paper fig. 1, fig. 17)."""
     entry = data.curves.get("networks")
     if entry is None:
         return None

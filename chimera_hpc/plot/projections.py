@@ -1,6 +1,6 @@
 """Runs in the space of variations: three planes and a view in three dimensions.
 
-Paper fig:hvsnmin:orient:1 (b) and fig:hvsnmin:orient:13D.
+Paper fig. 5 (b) and fig. 13.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MANY = 500
 
 
 def projections_figure(data: FigureInput, n_clusters: int) -> Figure | None:
-    """Draw the three planes of variations and a view in 3-D (paper fig:hvsnmin:orient:13D)."""
+    """Draw the three planes of variations and a view in 3-D (paper fig. 13)."""
     cut = data.classification.cuts[n_clusters]
     return projections(data.triplets, cut.labels, cut.names) if cut.names else None
 

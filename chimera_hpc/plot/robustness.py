@@ -1,4 +1,4 @@
-"""Fraction of chimeras after random reorientations, W(Q_r) (paper ratio-o1-o2)."""
+"""Fraction of chimeras after random reorientations, W(Q_r) (paper fig. 19)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SPARE = ("#aa3377", "#997700", "#0057b8", "#777777")
 
 
 def robustness_figure(data: FigureInput) -> Figure | None:
-    """Draw W(Q_r), with the sweeps next to this one (paper ratio-o1-o2)."""
+    """Draw W(Q_r), with the sweeps next to this one (paper fig. 19)."""
     curves = [*data.beside.values(), data.curves]
     bands = {}
     for entry in (each["robustness"] for each in curves if "robustness" in each):

@@ -1,4 +1,4 @@
-"""Space-time plots of u: node against time (paper fig:9dyn, fig:orient1_otherdyn and others)."""
+"""Space-time plots of u: node against time (paper fig. 3, fig. 16 and others)."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _DOTS = 1000
 
 
 def space_time_figure(data: FigureInput) -> Figure | None:
-    """Draw u over node and time for the runs to show, with a close-up (paper fig:9dyn)."""
+    """Draw u over node and time for the runs to show, with a close-up (paper fig. 3)."""
     return _of_runs(data.shown) if data.shown else None
 
 
 def whole_run_figure(data: FigureInput) -> Figure | None:
-    """Draw u from t = 0 on for the runs to replay (paper fig:dynamics_P=1)."""
+    """Draw u from t = 0 on for the runs to replay (paper fig. 12)."""
     return _of_runs(data.whole) if data.whole else None
 
 

@@ -1,4 +1,4 @@
-"""From the discrete spectrum to its parabola (paper fig:FFTsign)."""
+"""From the discrete spectrum to its parabola (paper fig. 9)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from chimera_hpc.plot.figure_input import FigureInput
 
 
 def spectrum_figure(data: FigureInput) -> Figure | None:
-    """Draw one window, its spectrum and the parabola (paper fig:FFTsign)."""
+    """Draw one window, its spectrum and the parabola (paper fig. 9)."""
     entry = data.curves.get("spectrum")
     if entry is None:
         return None

@@ -1,4 +1,4 @@
-"""Leading eigenvalues of the homogeneous equilibria (paper sec:stabhomeq)."""
+"""Leading eigenvalues of the homogeneous equilibria (paper app. A)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LOOKS = (
 
 
 def stability_figure(data: FigureInput) -> Figure | None:
-    """Draw leading eigenvalues against P (paper sec:stabhomeq)."""
+    """Draw leading eigenvalues against P (paper app. A)."""
     entry = data.curves.get("stability")
     return None if entry is None else stability(entry["rows"])
 

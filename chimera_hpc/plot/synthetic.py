@@ -1,4 +1,4 @@
-"""Reconstruction of a signal whose features are known (paper fig:FFT)."""
+"""Reconstruction of a signal whose features are known (paper fig. 11)."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _FLOOR = 1e-17
 
 
 def reconstruction_figure(data: FigureInput) -> Figure | None:
-    """Draw known and found profiles of the synthetic signal, and the errors (paper fig:FFT)."""
+    """Draw known and found profiles of the synthetic signal, and the errors (paper fig. 11)."""
     entry = data.curves.get("synthetic")
     return None if entry is None else reconstruction(entry["truth"], entry["found"])
 
 
 def signal_figure(data: FigureInput) -> Figure | None:
-    """Draw the synthetic signal over node and time (paper fig:reconstrsign)."""
+    """Draw the synthetic signal over node and time (paper fig. 10)."""
     entry = data.curves.get("synthetic")
     if entry is None:
         return None

@@ -225,7 +225,7 @@ class _Block:
     def distance(self, row: int, y_end: Array) -> float:
         """Distance of the last state (u, v) from the centre of the ball of initial states.
 
-        In the norm of the ball (paper fig:stability).
+        In the norm of the ball (paper fig. 2).
         """
         model, spec = self.models[row], self.sweep.integrator
         u, v = model.equilibrium(spec.centre)

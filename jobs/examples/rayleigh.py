@@ -11,7 +11,7 @@ for omega = 1, and frequency (1 - epsilon^2 / 16) / (2 pi).
 
 arXiv 2605.09401 classifies the states of a network of Rayleigh oscillators over coupling strength
 and range. The coupling here is the rotated one of the networked FitzHugh-Nagumo model (eq.
-eq:FHNnet); another one is a matter of two lines below.
+eq. (F1)); another one is a matter of two lines below.
 """
 
 import math

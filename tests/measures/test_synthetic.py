@@ -1,4 +1,4 @@
-"""The paper's synthetic signal (eq:syntsig): what it is, and what the method makes of it."""
+"""The paper's synthetic signal (eq. (B1)): what it is, and what the method makes of it."""
 
 import numpy as np
 import pytest

@@ -91,7 +91,7 @@ def _mean(values: Array, axis: int | None = None) -> Any:
 
 
 def sigma_l(given: AnalysisInput) -> dict[str, Any]:
-    """Classes of sigma_1 by the modes of its kernel density (paper fig:sigmal).
+    """Classes of sigma_1 by the modes of its kernel density (paper fig. 23).
 
     The number of classes is the density's own at Silverman's bandwidth; ``bandwidths_of_three`` is
     the interval of bandwidths with three modes.

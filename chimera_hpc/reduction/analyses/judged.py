@@ -62,7 +62,7 @@ def most_frequent(votes: Counter[Any]) -> str | None:
 
 
 def robustness(given: AnalysisInput) -> dict[str, Any]:
-    """W: share of chimeras by each atlas against the number of reversed links (ratio-o1-o2)."""
+    """W: share of chimeras by each atlas against the number of reversed links (fig. 19)."""
     given.need_atlas()
     flips = given.points.columns["flips"]
     curves = {}

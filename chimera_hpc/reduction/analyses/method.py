@@ -35,9 +35,9 @@ def variations(given: AnalysisInput) -> dict[str, Any]:
 
 
 def synthetic(given: AnalysisInput) -> dict[str, Any]:
-    """Known profiles against those found on [500, 1000] (fig:FFT), by two ways to refine.
+    """Known profiles against those found on [500, 1000] (fig. 11), by two ways to refine.
 
-    Absolute time: the phase is that of the signal at t = 0, as eq:syntsig has it.
+    Absolute time: the phase is that of the signal at t = 0, as eq. (B1) has it.
     """
     t = 500.0 + 0.01 * np.arange(50_001)
     u = synthetic_signal(t)
@@ -62,7 +62,7 @@ def synthetic(given: AnalysisInput) -> dict[str, Any]:
 
 
 def spectrum(given: AnalysisInput) -> dict[str, Any]:
-    """First window of node 1 of a chimera: samples and amplitude spectrum (paper fig:FFTsign).
+    """First window of node 1 of a chimera: samples and amplitude spectrum (paper fig. 9).
 
     The run is the second of ``reduction.show``. The window runs from a maximum to the ninth after
     it, both ends included, without padding or taper.

@@ -15,7 +15,7 @@ from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 
 def networks(given: AnalysisInput) -> dict[str, Any]:
-    """Links of the ring of each cell (paper fig:orient, fig:orient:3), and of the plain ring."""
+    """Links of the ring of each cell (paper fig. 1, fig. 17), and of the plain ring."""
     panels = []
     for i in range(given.n_cells):
         place = given.place(i)
@@ -73,7 +73,7 @@ def stability(given: AnalysisInput) -> dict[str, Any]:
 
 
 def basin(given: AnalysisInput) -> dict[str, Any]:
-    """f(P, R): share of runs whose last state is inside the ball they began in (fig:stability)."""
+    """f(P, R): share of runs whose last state is inside the ball they began in (fig. 2)."""
     columns = given.points.columns
     inside = given.scalar("distance") <= columns["delta"]
     made = basin_map(columns["P"], columns["delta"], inside, given.has_result)
@@ -96,7 +96,7 @@ def _last_above(radius: Any, fraction: Any, level: float) -> list[float]:
 
 
 def oscillation(given: AnalysisInput) -> dict[str, Any]:
-    """Runs of each cell that oscillate, move without oscillating, and rest (sec:moredetdyn).
+    """Runs of each cell that oscillate, move without oscillating, and rest (app. C).
 
     ``oscillating``: ten maxima fit into the analysis, so the Fourier method can be applied.
     ``moving``: the signal moves by more than ``features.steady_threshold``, but too slowly for
