@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from chimera_hpc.models.custom import OwnModel
     from chimera_hpc.models.networked_fhn import NetworkedFHN
     from chimera_hpc.models.parameters import Limit, Parameter
+    from chimera_hpc.network.network import Network
     from chimera_hpc.network.topology import Topology
     from chimera_hpc.run.simulate import simulate
     from chimera_hpc.store.labelled import open_sweep as open
@@ -23,6 +24,7 @@ __version__ = "0.2.0"
 
 __all__ = [
     "Limit",
+    "Network",
     "NetworkedFHN",
     "OwnModel",
     "Parameter",
@@ -37,6 +39,7 @@ __all__ = [
 # public name -> the module that has it, and its name there
 _EXPORTS = {
     "Limit": ("chimera_hpc.models.parameters", "Limit"),
+    "Network": ("chimera_hpc.network.network", "Network"),
     "NetworkedFHN": ("chimera_hpc.models.networked_fhn", "NetworkedFHN"),
     "OwnModel": ("chimera_hpc.models.custom", "OwnModel"),
     "Parameter": ("chimera_hpc.models.parameters", "Parameter"),
