@@ -72,7 +72,7 @@ def inherit(base_labels: Integers, base_names: Sequence[str], labels: Integers) 
 def add_suffixes(families: Sequence[str], centroids: Floats) -> list[str]:
     """Append -1, -2, ... to families of several clusters, by decreasing V_a of the centroid.
 
-    The paper numbers its sub-classes in this order (fig:orient1_5classes: weakly homogeneous
+    The paper numbers its sub-classes in this order (fig. 14: weakly homogeneous
     before travelling wave, irregular before nearly equal amplitudes).
     """
     names = list(families)

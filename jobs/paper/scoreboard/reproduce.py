@@ -34,7 +34,7 @@ _HEAD = """\
 by the rules in `jobs/paper/scoreboard/rules.py`, and writes this table (claims.md), results.json
 and the figures; `--quick` thins the grids, `--only JOB,...` runs some jobs, `--only none` judges
 what there is. Rules were fixed before the jobs were run; none was changed to suit a result, but for
-one that had counted slow motion without an oscillation as an oscillation (sec. moredetdyn), which
+one that had counted slow motion without an oscillation as an oscillation (app. C), which
 now has a claim of its own. Fractions have Wilson 95 % intervals.
 
 Every claim is judged twice, by the same runs and the same rule: under the default convention of the
