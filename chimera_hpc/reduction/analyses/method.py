@@ -71,7 +71,8 @@ def spectrum(given: AnalysisInput) -> dict[str, Any]:
     selections = given.sweep.reduction.show
     if not selections:
         raise BadInput("reduction.show names no run")
-    assert given.series is not None
+    if given.series is None:
+        raise BadInput("the runs' series are needed")
     text = selections[min(1, len(selections) - 1)]
     run = find_point(given.points, text)
     if run is None:
