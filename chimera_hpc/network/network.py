@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.network import hodge
+from chimera_hpc.network import files, generators, hodge, interchange
 from chimera_hpc.network.checks import Array, Integers
 from chimera_hpc.network.complex import SimplicialComplex
+from chimera_hpc.network.generators import Seed
 
 
 class Network(SimplicialComplex):
@@ -139,6 +143,160 @@ class Network(SimplicialComplex):
         inverse[1:] = 1.0 / self.laplacian_eigenvalues[1:n_modes]
         spectrum = np.fft.rfft(w, axis=0) * inverse.reshape(-1, *[1] * (w.ndim - 1))
         return np.fft.irfft(spectrum, n=self.n_nodes, axis=0)
+
+    # -- makers ----------------------------------------------------------------------------------
+
+    @classmethod
+    def lattice(cls, shape: int | Sequence[int], periodic: bool = True) -> Self:
+        """Lattice of any dimension with links from each node to the next one along every axis.
+
+        Nodes are numbered in row-major order. On a periodic lattice the last node of an axis is
+        linked to the first one; the divergence is then zero, and all sides are at least 3.
+        """
+        return cls._unchecked(**generators.lattice(shape, periodic))
+
+    @classmethod
+    def small_world(cls, n: int, P: int, rewire: float, seed: Seed = 0) -> Self:
+        """Ring of n nodes whose links have a new head with probability ``rewire``.
+
+        The links are those of `ring` in orientation 1; a rewired link keeps its tail and its place
+        (Watts and Strogatz, Nature 393, 440 (1998)). rewire = 0 gives the ring.
+        """
+        return cls._unchecked(**generators.small_world(n, P, rewire, seed))
+
+    @classmethod
+    def scale_free(cls, n: int, m: int, seed: Seed = 0) -> Self:
+        """Graph of Barabasi and Albert: each new node is linked to m others, chosen by degree.
+
+        Links of this and of the other random graphs point from the lower to the higher node.
+        """
+        return cls._unchecked(**generators.scale_free(n, m, seed))
+
+    @classmethod
+    def random(cls, n: int, mean_degree: float, seed: Seed = 0) -> Self:
+        """Graph with n mean_degree / 2 links (rounded) drawn uniformly (Erdos and Renyi)."""
+        return cls._unchecked(**generators.random(n, mean_degree, seed))
+
+    @classmethod
+    def modular(cls, sizes: Sequence[int], p_in: float, p_out: float, seed: Seed = 0) -> Self:
+        """Groups of nodes: pairs are linked with p_in within a group, with p_out across."""
+        return cls._unchecked(**generators.modular(sizes, p_in, p_out, seed))
+
+    @classmethod
+    def two_populations(cls, n: int, A: float) -> Self:
+        """Two populations of n nodes, all linked: 0..n-1 and n..2n-1.
+
+        Weights are (1 + A)/(2 n) within and (1 - A)/(2 n) across, so that coupling strength 1 is
+        that of Abrams, Mirollo, Strogatz and Wiley, Phys. Rev. Lett. 101, 084103 (2008).
+        """
+        return cls._unchecked(**generators.two_populations(n, A))
+
+    @classmethod
+    def multiplex(cls, layers: Sequence[SimplicialComplex], coupling: float = 1.0) -> Self:
+        """Layers with the same nodes; links of weight ``coupling`` join the copies of a node."""
+        return cls(**generators.multiplex(layers, coupling))
+
+    @classmethod
+    def from_edges(
+        cls,
+        edges: ArrayLike,
+        n_nodes: int | None = None,
+        weights: ArrayLike | None = None,
+        directed: bool = False,
+    ) -> Self:
+        """Network of rows (tail, head) or (tail, head, weight); n_nodes default to all named."""
+        return cls(**interchange.from_edges(edges, n_nodes, weights, directed))
+
+    @classmethod
+    def from_networkx(
+        cls, graph: Any, weight: str = "weight", group: str = "group", directed: bool | None = None
+    ) -> Self:
+        """Network of a networkx graph, with nodes numbered in the order of the graph.
+
+        ``weight`` and ``group`` name the attributes of edges and of nodes. An undirected graph has
+        no orientations: links point from the lower to the higher number, unless the edge attribute
+        "orientation" is -1, as `to_networkx` writes it. A DiGraph is a directed network; with
+        ``directed=False`` its directions are orientations.
+        """
+        return cls(**interchange.from_networkx(graph, weight, group, directed))
+
+    def to_networkx(self) -> Any:
+        """Return a networkx Graph (or DiGraph) that `from_networkx` reads without loss."""
+        return interchange.to_networkx(self)
+
+    @classmethod
+    def from_matrices(
+        cls, B1: Any = None, B2: Any = None, adjacency: Any = None, directed: bool | None = None
+    ) -> Self:
+        """Network of boundary matrices, as `boundary` gives them, or of an adjacency matrix.
+
+        Entry (i, j) of the adjacency is the weight of the link from j to i. A matrix that is not
+        symmetric makes a directed network. Matrices may be dense or of scipy.sparse.
+
+        Raises
+        ------
+        BadInput
+            B1 B2 is not 0 (the message names the triangle), entries that are no links, loops.
+        """
+        if (B1 is None) == (adjacency is None):
+            raise BadInput("from_matrices needs B1 (and perhaps B2) or adjacency, one of the two")
+        if B1 is None:
+            return cls(**interchange.from_adjacency(adjacency, directed))
+        return cls(**interchange.from_boundaries(B1, B2))
+
+    @classmethod
+    def from_xgi(cls, simplices: Any, orientations: Mapping[Any, int] | None = None) -> Self:
+        """Network of an XGI SimplicialComplex, oriented as by XGI's ``boundary_matrix``."""
+        return cls(**interchange.from_xgi(simplices, orientations))
+
+    def to_xgi(self) -> tuple[Any, dict[int, int]]:
+        """Return an XGI SimplicialComplex and its orientations; weights are left out."""
+        return interchange.to_xgi(self)
+
+    @classmethod
+    def from_file(
+        cls, path: str | Path, n_nodes: int | None = None, directed: bool | None = None
+    ) -> Self:
+        """Network of a file, by the ending of its name.
+
+        .csv, .tsv, .txt, .edges, .edgelist: one link per line as tail, head and perhaps weight, or
+        a square table, an adjacency matrix. .graphml, .gml, .json (node-link). .npy, .npz, .mtx,
+        .mat: an adjacency matrix, or an incidence matrix, which is not square; several arrays in
+        one file are called "adjacency", "B1" and "B2".
+
+        Raises
+        ------
+        BadInput
+            A file that is no network, or one of another size than ``n_nodes``.
+        """
+        parts = files.read_parts(path, directed)
+        try:
+            network = cls(**parts)
+        except BadInput as error:
+            raise BadInput(f"{path}: {error}") from None
+        if n_nodes not in (None, network.n_nodes):
+            raise BadInput(f"{path} has {network.n_nodes} nodes, but n_nodes = {n_nodes}")
+        return network
+
+    # -- groups ----------------------------------------------------------------------------------
+
+    @cached_property
+    def communities(self) -> Integers:
+        """Community of each node, shape (N0,): the given groups, or those that Louvain finds."""
+        return interchange.louvain(self) if self.groups is None else self.groups
+
+    @cached_property
+    def order(self) -> Integers:
+        """Nodes in the order of pictures and chains, shape (N0,).
+
+        The given order; otherwise a ring's nodes as they are, and those of other networks by
+        community.
+        """
+        if self.node_order is not None:
+            return self.node_order
+        if self.half_degree:
+            return np.arange(self.n_nodes)
+        return np.argsort(self.communities, kind="stable")
 
     def _need_ring(self, what: str) -> None:
         if not self.half_degree:
