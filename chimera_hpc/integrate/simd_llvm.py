@@ -150,6 +150,27 @@ def store_at(typing_context, array, offset, vector):
 
 
 @intrinsic
+def integer_at(typing_context, array, offset):
+    """Read one number of an int64 ``array``; the offset must not be negative."""
+
+    def generate(context, builder, signature, args):
+        return builder.load(_pointer(context, builder, signature, args, "number"), align=8)
+
+    return types.int64(array, offset), generate
+
+
+@intrinsic
+def real_at(typing_context, array, offset):
+    """Read the bits of one number of an int64 ``array`` as a float64."""
+
+    def generate(context, builder, signature, args):
+        pointer = _pointer(context, builder, signature, args, "number")
+        return builder.load(builder.bitcast(pointer, _DOUBLE.as_pointer()), align=8)
+
+    return types.float64(array, offset), generate
+
+
+@intrinsic
 def stream_at(typing_context, array, offset, vector):
     """Write as `store_at` does, but bypass the caches. The address must start a cache line."""
 

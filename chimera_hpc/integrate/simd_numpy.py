@@ -70,6 +70,16 @@ def fold(vector):
     return quarter[0] + quarter[1]
 
 
+def integer_at(array, offset):
+    """Read one number of an int64 ``array``; the offset must not be negative."""
+    return array[offset]
+
+
+def real_at(array, offset):
+    """Read the bits of one number of an int64 ``array`` as a float64."""
+    return array[offset : offset + 1].view(np.float64)[0]
+
+
 def stream_at(array, offset, vector):
     """Write as `store_at` does, but bypass the caches. The address must start a cache line."""
     store_at(array, offset, vector)

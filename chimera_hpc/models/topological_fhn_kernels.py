@@ -29,7 +29,8 @@ THIRD = 1.0 / 3.0
 
 
 @jit()
-def _activator(u, w, rate):
+def activator(u, w, rate):
+    """Return du/dt, ``rate`` = 1/epsilon."""
     # With opposite signs: (u^3 / 3 - u + w) * -rate.
     return fma(u, fma(u * u, THIRD, -1.0), w) * (-1.0 * rate)
 
@@ -46,7 +47,7 @@ def _recovery(u, w, source, total, width, c):
 def _node(zero, i, total, context):
     y, dy, params, n, width, c, rate = context
     u, w = load(zero, y, i), load(zero, y, n + i)
-    store(dy, i, _activator(u, w, rate))
+    store(dy, i, activator(u, w, rate))
     store(dy, n + i, _recovery(u, w, load(zero, params, 2 + i), total, width, c))
 
 
@@ -78,12 +79,12 @@ def _reduced_along(y, dy, params, ints):
         if i + 8 <= n:
             u, w = load_at(y, i), load_at(y, n + i)
             source = load_at(params, 2 + i)
-            store_at(dy, i, _activator(u, w, rate))
+            store_at(dy, i, activator(u, w, rate))
             store_at(dy, n + i, _recovery(u, w, source, total, width, c))
         else:
             u, w = load_some(y, i, 0, n - i), load_some(y, n + i, 0, n - i)
             source = load_some(params, 2 + i, 0, n - i)
-            store_some(dy, i, _activator(u, w, rate), n - i)
+            store_some(dy, i, activator(u, w, rate), n - i)
             store_some(dy, n + i, _recovery(u, w, source, total, width, c), n - i)
 
 
