@@ -13,8 +13,14 @@ if TYPE_CHECKING:
     from chimera_hpc.measures.fourier import fourier_features
     from chimera_hpc.measures.variation import total_variations
     from chimera_hpc.models.custom import OwnModel
+    from chimera_hpc.models.frequencies import natural_frequencies
+    from chimera_hpc.models.kuramoto_sakaguchi import KuramotoSakaguchi
     from chimera_hpc.models.networked_fhn import NetworkedFHN
+    from chimera_hpc.models.networked_fhn_network import NetworkFHN
     from chimera_hpc.models.parameters import Limit, Parameter
+    from chimera_hpc.models.simplicial_kuramoto import SimplicialKuramoto
+    from chimera_hpc.models.stuart_landau import StuartLandau
+    from chimera_hpc.models.topological_fhn import TopologicalFHN
     from chimera_hpc.network.network import Network
     from chimera_hpc.network.topology import Topology
     from chimera_hpc.run.simulate import simulate
@@ -23,14 +29,20 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 __all__ = [
+    "KuramotoSakaguchi",
     "Limit",
     "Network",
+    "NetworkFHN",
     "NetworkedFHN",
     "OwnModel",
     "Parameter",
+    "SimplicialKuramoto",
+    "StuartLandau",
+    "TopologicalFHN",
     "Topology",
     "__version__",
     "fourier_features",
+    "natural_frequencies",
     "open",
     "simulate",
     "total_variations",
@@ -40,6 +52,12 @@ __all__ = [
 _EXPORTS = {
     "Limit": ("chimera_hpc.models.parameters", "Limit"),
     "Network": ("chimera_hpc.network.network", "Network"),
+    "KuramotoSakaguchi": ("chimera_hpc.models.kuramoto_sakaguchi", "KuramotoSakaguchi"),
+    "NetworkFHN": ("chimera_hpc.models.networked_fhn_network", "NetworkFHN"),
+    "SimplicialKuramoto": ("chimera_hpc.models.simplicial_kuramoto", "SimplicialKuramoto"),
+    "StuartLandau": ("chimera_hpc.models.stuart_landau", "StuartLandau"),
+    "TopologicalFHN": ("chimera_hpc.models.topological_fhn", "TopologicalFHN"),
+    "natural_frequencies": ("chimera_hpc.models.frequencies", "natural_frequencies"),
     "NetworkedFHN": ("chimera_hpc.models.networked_fhn", "NetworkedFHN"),
     "OwnModel": ("chimera_hpc.models.custom", "OwnModel"),
     "Parameter": ("chimera_hpc.models.parameters", "Parameter"),

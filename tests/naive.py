@@ -324,6 +324,80 @@ def networked_rhs(state, n, half, sigma, epsilon, b, phi):
     return np.concatenate([dx, dy])
 
 
+# --- models on networks, with dense matrices ------------------------------------------------------
+
+
+def dense_boundaries(network):
+    """B_1 W^(1/2) and W^(-1/2) B_2, entry by entry."""
+    weights = np.ones(len(network.links)) if network.weights is None else network.weights
+    b1 = np.zeros((network.n_nodes, len(network.links)))
+    for j, (tail, head) in enumerate(network.links):
+        b1[tail, j], b1[head, j] = -math.sqrt(weights[j]), math.sqrt(weights[j])
+    triangles = () if network.triangles is None else network.triangles
+    b2 = np.zeros((len(network.links), len(triangles)))
+    for t, (a, b, c) in enumerate(triangles):
+        for start, end in ((a, b), (b, c), (c, a)):
+            for j, (tail, head) in enumerate(network.links):
+                if {tail, head} == {start, end}:
+                    b2[j, t] = (1 if tail == start else -1) / math.sqrt(weights[j])
+    return b1, b2
+
+
+def dirac(network, k):
+    """D = [B_k^T, B_(k+1)], and how many of its columns belong to B_k^T."""
+    b1, b2 = dense_boundaries(network)
+    if k == 0:
+        return b1, 0
+    return (np.hstack([b1.T, b2]), len(b1)) if k == 1 else (b2.T, len(b2))
+
+
+def dense_adjacency(network):
+    """Weight of the link from j to i."""
+    weights = np.ones(len(network.links)) if network.weights is None else network.weights
+    a = np.zeros((network.n_nodes, network.n_nodes))
+    for (tail, head), weight in zip(network.links, weights, strict=True):
+        a[head, tail] = weight
+        if not network.directed:
+            a[tail, head] = weight
+    return a
+
+
+def simplicial_fhn_rhs(state, d, epsilon, b, c):
+    """Signals u and all linear signals of the topological model, d = D."""
+    u, v = state[: len(d)], state[len(d) :]
+    return np.concatenate([(u - u**3 / 3 - d @ v) / epsilon, b + c * v + d.T @ u])
+
+
+def kuramoto_sakaguchi_rhs(theta, a, coupling, lag, omega):
+    """Phases on the nodes of a graph with the weights a."""
+    return omega + coupling * (a * np.sin(theta[None, :] - theta[:, None] - lag)).sum(axis=1)
+
+
+def stuart_landau_rhs(z, a, coupling, lag, growth, omega, shear):
+    """Complex oscillators on the nodes of a graph with the weights a."""
+    pull = coupling * np.exp(-1j * lag) * (a * (z[None, :] - z[:, None])).sum(axis=1)
+    return (growth + 1j * omega) * z - (1 + 1j * shear) * abs(z) ** 2 * z + pull
+
+
+def network_fhn_rhs(x, y, a, sigma, epsilon, b, phi):
+    """Both variables of the networked model on a graph with the weights a."""
+    degree = a.sum(axis=1)
+    pull_x = (a * (x[None, :] - x[:, None])).sum(axis=1) / degree
+    pull_y = (a * (y[None, :] - y[:, None])).sum(axis=1) / degree
+    bxx, bxy = math.cos(phi), math.sin(phi)
+    dx = (x - x**3 / 3 - y + sigma * (bxx * pull_x + bxy * pull_y)) / epsilon
+    return dx, x + b + sigma * (-bxy * pull_x + bxx * pull_y)
+
+
+def simplicial_kuramoto_rhs(theta, d, lower, coupling, omega, explosive):
+    """Phases on simplices; the first ``lower`` columns of d are B_k^T."""
+    down, up = d[:, :lower].T @ theta, d[:, lower:].T @ theta
+    r_down = abs(np.exp(1j * down).mean()) if explosive else 1.0
+    r_up = abs(np.exp(1j * up).mean()) if explosive else 1.0
+    pull = r_up * d[:, :lower] @ np.sin(down) + r_down * d[:, lower:] @ np.sin(up)
+    return omega - coupling * pull
+
+
 # --- integrator -----------------------------------------------------------------------------------
 
 

@@ -44,6 +44,12 @@ class Packed:
     n_shared: int
     n_entries: int
 
+    @property
+    def kernel(self) -> str:
+        """How a product is computed, in words."""
+        rows = f"{self.n_shared} shared rows" if self.n_shared else "sparse rows"
+        return f"{rows}, {self.n_entries} entries"
+
 
 @lru_cache(maxsize=32)
 def packed(network: Network, which: Which, k: int = 0) -> Packed:
@@ -73,9 +79,7 @@ def packed(network: Network, which: Which, k: int = 0) -> Packed:
     return pack(csr_array(network.adjacency - diags_array(degree)))
 
 
-def pack(
-    *matrices: csr_array, share: bool = True, numbers: tuple[int, ...] = ()
-) -> Packed:
+def pack(*matrices: csr_array, share: bool = True, numbers: tuple[int, ...] = ()) -> Packed:
     """Return matrices as integers: a header of six for each, ``numbers``, then the parts.
 
     The header is: rows of M, rows of T (0: none shared), offsets of starts, columns, values, and

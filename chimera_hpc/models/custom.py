@@ -11,6 +11,7 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -19,7 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import compile_uncached
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
+from chimera_hpc.models.own_network import compile_with_network, with_network
 from chimera_hpc.models.parameters import Limit, ModelParameters, Parameter
+from chimera_hpc.network.network import Network
 
 __all__ = ["Limit", "OwnModel", "OwnPoint", "Parameter"]
 
@@ -77,11 +80,18 @@ class OwnModel:
         The numbers after n_nodes in ``ints``, e.g. shapes and lists of neighbours of a network.
     limits : sequence of Limit, optional
         Bounds of one parameter by others. They are checked for every point of a plan.
+    network : bool, optional
+        Whether the model lives on any network. The right-hand side then has a fifth argument
+        ``network``, the links as CSR arrays (`own_network.Neighbours`), which all lanes share:
+
+            for e in range(network.indptr[i], network.indptr[i + 1]):
+                pull += network.weights[e] * (y[network.indices[e], lane] - y[i, lane])
 
     Raises
     ------
     BadInput
-        Invalid or repeated names, or a function with wrong arguments.
+        Invalid or repeated names, parameters that are no numbers, or a function with wrong
+        arguments.
     """
 
     def __init__(
@@ -96,12 +106,16 @@ class OwnModel:
         reals: Prepare | None = None,
         integers: Prepare | None = None,
         limits: Sequence[Limit] = (),
+        network: bool = False,
     ) -> None:
         self.function: Any = getattr(right_hand_side, "py_func", right_hand_side)
         self.variables = tuple(variables)
         self.initial, self.reals, self.integers = initial, reals, integers
+        self.on_network = network
         _check_names(self.variables, parameters)
-        _check_arguments("right_hand_side", self.function, ARGUMENTS)
+        _check_kinds(parameters)
+        wanted = (*ARGUMENTS, "network") if network else ARGUMENTS
+        _check_arguments("right_hand_side", self.function, wanted)
         _check_arguments("initial", initial, ("rng", "row", "n_nodes"))
         for name, function in (("reals", reals), ("integers", integers)):
             _check_arguments(name, function, ("row", "n_nodes"))
@@ -125,7 +139,16 @@ class OwnModel:
 
     def build(self, sweep: Any, row: Row) -> OwnPoint:
         """Return the model of one point, from its row of columns."""
-        n_nodes = int(sweep.n_nodes)
+        return self.point(row, int(sweep.n_nodes), sweep.model)
+
+    def point(
+        self, row: Row, n_nodes: int, name: str = "own", network: Network | None = None
+    ) -> OwnPoint:
+        """Return the model with the parameters ``row``, on a network if it has ``network=True``."""
+        if self.on_network and network is None:
+            raise BadInput(f"{name}: a network is needed, as the model has network=True")
+        if network is not None and not self.on_network:
+            raise BadInput(f"{name}: the model gets no network without OwnModel(network=True)")
         named = self.parameters.parameters
         reals: Any = [row[p.name] for p in named if p.kind is float]
         integers: Any = [row[p.name] for p in named if p.kind is int]
@@ -133,13 +156,14 @@ class OwnModel:
             reals = self.reals(row, n_nodes)
         if self.integers is not None:
             integers = self.integers(row, n_nodes)
+        shared = np.concatenate([[n_nodes], _flat("integers", integers, np.int64)])
         return OwnPoint(
             own=self,
-            name=sweep.model,
+            name=name,
             n_nodes=n_nodes,
             row=row,
             lane_params=_flat("reals", reals, np.float64),
-            int_params=np.concatenate([[n_nodes], _flat("integers", integers, np.int64)]),
+            int_params=shared if network is None else with_network(tuple(shared), network),
         )
 
     @cached_property
@@ -157,6 +181,8 @@ class OwnModel:
                     "leave that out, or an edit may go unnoticed"
                 )
         try:
+            if self.on_network:
+                return compile_with_network(self.function)
             return compile_uncached(RIGHT_HAND_SIDE, self.function)
         except Exception as error:
             # numba may raise any exception for a user's code.
@@ -187,7 +213,8 @@ class OwnPoint:
     @property
     def lane_group(self) -> tuple[Any, ...]:
         """Key that trajectories must share to run as lanes of one kernel call."""
-        return (self.name, self.int_params.tobytes(), len(self.lane_params))
+        shared = blake2b(self.int_params.tobytes(), digest_size=16).digest()
+        return (self.name, shared, len(self.lane_params))
 
     @property
     def right_hand_side(self) -> Any:
@@ -239,6 +266,17 @@ def _check_names(variables: tuple[str, ...], parameters: Sequence[Parameter]) ->
         raise BadInput(f"parameters: {', '.join(sorted(taken))}: every sweep has that already")
     if not variables:
         raise BadInput("variables: a node has at least one")
+
+
+def _check_kinds(parameters: Sequence[Parameter]) -> None:
+    for p in parameters:
+        if p.kind not in (int, float):
+            kind = getattr(p.kind, "__name__", p.kind)
+            raise BadInput(
+                f"parameter {p.name} is of kind {kind}, and parameters are numbers: give each word "
+                f'a number, Parameter("{p.name}", int, 0, "0 one, 1 the other", low=0, high=1), or '
+                "make one model for each"
+            )
 
 
 def _check_arguments(name: str, function: Any, wanted: tuple[str, ...]) -> None:

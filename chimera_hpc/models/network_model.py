@@ -51,6 +51,11 @@ class NetworkModel:
         return packed(self.network, self.which)
 
     @property
+    def kernel(self) -> str:
+        """How the coupling is computed, in words."""
+        return self.packed.kernel
+
+    @property
     def int_params(self) -> NDArray[np.int64]:
         """Integers that all lanes share: the matrix."""
         return self.packed.integers

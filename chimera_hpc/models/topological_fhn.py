@@ -103,6 +103,11 @@ class TopologicalFHN:
         return self.topology.half_degree > 0 and self.order == 0
 
     @property
+    def kernel(self) -> str:
+        """How L_k u is computed, in words: the cheapest way that the network allows."""
+        return "sliding sums" if self.slides else self._packed.kernel
+
+    @property
     def n_nodes(self) -> int:
         """Number of oscillators N_k."""
         return self.topology.size(self.signals)
@@ -222,7 +227,9 @@ class TopologicalFHN:
     @property
     def n_second(self) -> int:
         """Number of linear signals: v- on (k - 1)-simplices, then v+ on (k + 1)-simplices."""
-        return self.topology.n_links if self.order == 0 else self.topology.dirac(self.order).shape[1]
+        return (
+            self.topology.n_links if self.order == 0 else self.topology.dirac(self.order).shape[1]
+        )
 
 
 def _build(sweep: Any, row: Row) -> TopologicalFHN:
