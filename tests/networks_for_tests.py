@@ -1,4 +1,4 @@
-"""Random networks and complexes that several test files use, and right-hand sides called by hand."""
+"""Random networks that several test files use, and right-hand sides called by hand."""
 
 from __future__ import annotations
 

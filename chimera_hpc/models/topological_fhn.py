@@ -97,15 +97,20 @@ class TopologicalFHN:
         """Dimension k of the simplices on which u lives."""
         return dimension(self.signals)
 
-    @property
-    def slides(self) -> bool:
-        """Whether L_0 u is computed as a sliding sum: u on the nodes of a ring."""
-        return self.topology.half_degree > 0 and self.order == 0
+    @cached_property
+    def reach(self) -> int:
+        """P if L_0 u is computed as a sliding sum, on the nodes of a ring; 0 otherwise.
+
+        In reduced form, a ring may be given by its links in any order.
+        """
+        if self.order > 0:
+            return 0
+        return self.topology.half_degree or (_reach(self.topology) if self.form == "reduced" else 0)
 
     @property
     def kernel(self) -> str:
         """How L_k u is computed, in words: the cheapest way that the network allows."""
-        return "sliding sums" if self.slides else self._packed.kernel
+        return "sliding sums" if self.reach else self._packed.kernel
 
     @property
     def n_nodes(self) -> int:
@@ -120,14 +125,14 @@ class TopologicalFHN:
     @property
     def lane_group(self) -> tuple[Any, ...]:
         """Key that trajectories must share to run as lanes of one kernel call."""
-        if self.slides:
-            return (self.name, self.form, self.n_nodes, self.topology.half_degree)
+        if self.reach:
+            return (self.name, self.form, self.n_nodes, self.reach)
         return (self.name, self.form, self._packed.key)
 
     @property
     def right_hand_side(self) -> Any:
         """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
-        if self.slides:
+        if self.reach:
             from chimera_hpc.models.topological_fhn_kernels import compiled
         else:
             from chimera_hpc.models.simplicial_fhn_kernels import compiled
@@ -142,8 +147,8 @@ class TopologicalFHN:
     @property
     def int_params(self) -> NDArray[np.int64]:
         """Integers that all lanes share: N0, P of a ring; of others the matrices."""
-        if self.slides:
-            return np.array([self.n_nodes, self.topology.half_degree], dtype=np.int64)
+        if self.reach:
+            return np.array([self.n_nodes, self.reach], dtype=np.int64)
         return self._packed.integers
 
     @cached_property
@@ -151,9 +156,9 @@ class TopologicalFHN:
         """This trajectory's column of parameters, shape (n_params,)."""
         rate = 1.0 / self.epsilon
         if self.form == "full":
-            signs = self.topology.link_signs if self.slides else np.empty(0)
+            signs = self.topology.link_signs if self.reach else np.empty(0)
             return np.concatenate([[rate, self.b, self.c], signs])
-        work = np.zeros(0 if self.slides else self._packed.n_shared)
+        work = np.zeros(0 if self.reach else self._packed.n_shared)
         source = self.topology.source(self.order)
         return np.concatenate([[rate, self.c], self.b * source, work])
 
@@ -230,6 +235,16 @@ class TopologicalFHN:
         return (
             self.topology.n_links if self.order == 0 else self.topology.dirac(self.order).shape[1]
         )
+
+
+def _reach(network: Network) -> int:
+    """Return P if the links join each node with the P next ones on either side, else 0."""
+    n, half = network.n_nodes, network.n_links // network.n_nodes
+    if network.weights is not None or network.n_links != n * half or 2 * half >= n:
+        return 0
+    ahead = (network.links[:, 1] - network.links[:, 0]) % n
+    # No two links join the same nodes.
+    return half if np.minimum(ahead, n - ahead).max(initial=0) <= half else 0
 
 
 def _build(sweep: Any, row: Row) -> TopologicalFHN:

@@ -1,4 +1,4 @@
-"""The topological model on any network and of any order: both forms, gauges, the ring's own sums."""
+"""The topological model on any network and order: both forms, gauges, ring's sums."""
 
 from __future__ import annotations
 
@@ -65,16 +65,44 @@ def test_linear_signals_lie_on_both_sides_of_the_links():
     assert run.v.shape == (2, network.n_nodes + network.n_triangles)
 
 
-@pytest.mark.parametrize("half", [1, 4])
-def test_ring_as_a_list_of_links_runs_as_the_ring(half):
+@pytest.mark.parametrize("half", [1, 4, 9])
+def test_ring_as_a_list_of_links_has_the_bits_of_the_ring(half):
     ring = Network.ring(20, half).reorient_node(0, half)
     edges = Network(20, ring.links)
-    assert TopologicalFHN(ring).kernel == "sliding sums"
-    assert TopologicalFHN(edges).kernel == f"sparse rows, {20 * (2 * half + 1)} entries"
-    given = start(ring, 0) | {"t_end": 5.0, "t_step": 0.5, "rtol": 1e-12, "atol": 1e-14}
-    own, sparse = (simulate(network, **given) for network in (ring, edges))
-    np.testing.assert_allclose(sparse.u, own.u, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(sparse.v, own.v, rtol=0, atol=1e-12)
+    assert edges.half_degree == 0
+    assert TopologicalFHN(ring).lane_group == TopologicalFHN(edges).lane_group
+    given = start(ring, 0) | {"t_end": 20.0}
+    own, listed = (simulate(network, **given) for network in (ring, edges))
+    assert listed.u.tobytes() == own.u.tobytes()
+    np.testing.assert_allclose(listed.v, own.v, rtol=0, atol=1e-9)
+    shuffled = Network(20, np.random.default_rng(0).permutation(ring.links))
+    assert TopologicalFHN(shuffled).reach == half
+
+
+@pytest.mark.parametrize("half", [1, 4])
+def test_relabelled_ring_has_the_slopes_of_the_ring(half):
+    ring = Network.ring(20, half).reorient_node(0, half)
+    new = np.random.default_rng(1).permutation(20)
+    models = TopologicalFHN(ring), TopologicalFHN(ring.relabel(new))
+    kernels = [model.kernel for model in models]
+    assert kernels == ["sliding sums", f"sparse rows, {20 * (2 * half + 1)} entries"]
+    u, w = np.random.default_rng(2).uniform(-1, 1, (2, 20))
+    moved = np.empty((2, 20))
+    moved[:, new] = u, w
+    expected = slope(models[0], np.concatenate([u, w])).reshape(2, 20)
+    found = slope(models[1], moved.ravel()).reshape(2, 20)[:, new]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("change", ["a link more", "a longer link", "a weight"])
+def test_what_is_nearly_a_ring_is_none(change):
+    links = Network.ring(9, 2).links.copy()
+    weights = np.where(np.arange(18) == 3, 1.5, 1.0) if change == "a weight" else None
+    if change == "a link more":
+        links = np.vstack([links, [0, 4]])
+    if change == "a longer link":
+        links[0] = 0, 4
+    assert TopologicalFHN(Network(9, links, weights=weights)).reach == 0
 
 
 # --- invariants and gauges ------------------------------------------------------------------------
