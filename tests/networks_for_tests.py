@@ -29,6 +29,13 @@ def complete(n: int) -> Network:
     return Network(n, np.array([(i, j) for i in range(n) for j in range(i + 1, n)]))
 
 
+def two_populations(n: int, disparity: float) -> Network:
+    """2 n nodes, all linked: weights (1 + A) / 2 n within a population, (1 - A) / 2 n across."""
+    network = complete(2 * n)
+    within = (network.links[:, 0] < n) == (network.links[:, 1] < n)
+    return network.with_weights((1 + np.where(within, disparity, -disparity)) / (2 * n))
+
+
 def slope(model: Any, state: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the right-hand side of one trajectory (n_rows,)."""
     return slopes([model], state[:, None])[:, 0]

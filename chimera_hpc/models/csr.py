@@ -147,18 +147,19 @@ def _classes(off: csr_array, values: Array) -> tuple[Integers, Array]:
     """Return the class of each row, and the value that links its rows with each other.
 
     Rows i and j that are linked by a and equal in all other columns have equal
-    ``off @ r + a r`` for a random r.
+    ``off @ r + a r`` for a random r. Each row is in the largest class that this finds.
     """
     n = off.shape[0]
-    labels, own = np.arange(n), np.zeros(n)
+    labels, own, size = np.arange(n), np.zeros(n), np.ones(n)
     r = np.random.default_rng(0).uniform(1.0, 2.0, n)
     product = off @ r
-    for a in (0.0, *values):
+    for number, a in enumerate((0.0, *values), start=1):
         key = product + a * r
         order = np.argsort(key, kind="stable")
-        new = np.diff(key[order], prepend=-np.inf) > 1e-10 * np.abs(key).max()
-        members = np.empty(n, dtype=np.int64)
-        members[order] = order[np.flatnonzero(new)][np.cumsum(new) - 1]
-        several = (np.bincount(members, minlength=n) > 1)[members] & (labels == np.arange(n))
-        labels[several], own[several] = members[several], a
+        new = np.diff(key[order], prepend=-np.inf) > 1e-12 * np.abs(key).max()
+        group = np.empty(n, dtype=np.int64)
+        group[order] = np.cumsum(new) - 1
+        members = np.bincount(group)[group]
+        larger = members > size
+        labels[larger], own[larger], size[larger] = (number * n + group)[larger], a, members[larger]
     return np.unique(labels, return_inverse=True)[1], own

@@ -15,6 +15,7 @@ from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
 from chimera_hpc.network.network import Network
 
 Integers = NDArray[np.int64]
+_types: Any = types  # numba's annotations leave its named tuples out
 
 
 class Neighbours(NamedTuple):
@@ -34,7 +35,7 @@ def compile_with_network(function: Callable[..., Any]) -> Any:
     """Compile ``function(y, dy, p, ints, network)``, with `Neighbours`, as a right-hand side."""
     integers = RIGHT_HAND_SIDE.args[3]
     reals = types.Array(types.float64, 1, "C")
-    network = types.NamedTuple((integers, integers, reals), Neighbours)
+    network = _types.NamedTuple((integers, integers, reals), Neighbours)
     inner = compile_uncached(types.void(*RIGHT_HAND_SIDE.args, network), function)
 
     def right_hand_side(y: Any, dy: Any, p: Any, numbers: Any) -> None:

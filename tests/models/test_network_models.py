@@ -9,7 +9,7 @@ import naive
 import numpy as np
 import pytest
 from kernel_tools import run_all
-from networks_for_tests import complete, random_complex, slope
+from networks_for_tests import complete, random_complex, slope, two_populations
 
 from chimera_hpc import (
     KuramotoSakaguchi,
@@ -25,13 +25,15 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.lanes import Control
 from chimera_hpc.integrate.simd import LANES
 
-DIRECTED = Network(6, np.array([[0, 1], [1, 2], [2, 0], [3, 2], [4, 3], [5, 4], [0, 5]]), directed=True)
+DIRECTED = Network(
+    6, np.array([[0, 1], [1, 2], [2, 0], [3, 2], [4, 3], [5, 4], [0, 5]]), directed=True
+)
 NETWORKS = {
     "weighted": random_complex(0),
     "directed": DIRECTED,
     "negative": DIRECTED.with_weights(np.array([1.0, -0.5, 2.0, 0.3, 1.0, 0.7, 1.0])),
     "complete": complete(20),
-    "two populations": Network.two_populations(10, 0.2),
+    "two populations": two_populations(10, 0.2),
 }
 networks = pytest.mark.parametrize("network", NETWORKS.values(), ids=NETWORKS)
 
@@ -99,24 +101,25 @@ def test_simplicial_kuramoto_on_nodes_is_kuramoto():
     )
 
 
-@pytest.mark.parametrize("sharing", [False, True])
+PLAIN, SHARING = NETWORKS["weighted"], NETWORKS["two populations"]
+HOLLOW = random_complex(1, weighted=False)
+
+
 @pytest.mark.parametrize(
-    "model",
+    ("model", "n_shared"),
     [
-        KuramotoSakaguchi(NETWORKS["weighted"], 0.5, 0.3),
-        StuartLandau(NETWORKS["weighted"], 0.1),
-        NetworkFHN(NETWORKS["weighted"]),
-        SimplicialKuramoto(random_complex(1, weighted=False)),
-        SimplicialKuramoto(random_complex(1, weighted=False), explosive=True),
+        (KuramotoSakaguchi(PLAIN, phase_lag=0.3), 0),
+        (KuramotoSakaguchi(SHARING, phase_lag=0.3), 2),
+        (StuartLandau(PLAIN), 0),
+        (StuartLandau(SHARING), 2),
+        (NetworkFHN(PLAIN), 0),
+        (NetworkFHN(SHARING), 2),
+        (SimplicialKuramoto(HOLLOW), 0),
+        (SimplicialKuramoto(HOLLOW, explosive=True), 0),
     ],
-    ids=["kuramoto", "stuart-landau", "fhn", "simplicial", "explosive"],
 )
-def test_lanes_have_the_bits_of_runs_alone(model, sharing):
-    if sharing:
-        if isinstance(model, SimplicialKuramoto):
-            pytest.skip("its matrices share no rows")
-        model = replace(model, network=NETWORKS["two populations"])
-        assert model.packed.n_shared == 2
+def test_lanes_have_the_bits_of_runs_alone(model, n_shared):
+    assert model.packed.n_shared == n_shared
     parameter = "sigma" if isinstance(model, NetworkFHN) else "coupling"
     models = [replace(model, **{parameter: 0.1 * (lane + 1)}) for lane in range(LANES)]
     assert len({one.lane_group for one in models}) == 1
@@ -146,8 +149,12 @@ def test_oscillators_without_coupling_have_the_known_cycle():
     run = simulate(
         model, u0=np.full(4, 0.5), v0=np.zeros(4), t_end=10.0, t_step=0.01, rtol=1e-9, atol=1e-12
     )
-    np.testing.assert_allclose(run.u, np.repeat(0.5 * np.cos(1.25 * run.t)[:, None], 4, 1), atol=1e-7)
-    np.testing.assert_allclose(run.w, np.repeat(0.5 * np.sin(1.25 * run.t)[:, None], 4, 1), atol=1e-7)
+    np.testing.assert_allclose(
+        run.u, np.repeat(0.5 * np.cos(1.25 * run.t)[:, None], 4, 1), atol=1e-7
+    )
+    np.testing.assert_allclose(
+        run.w, np.repeat(0.5 * np.sin(1.25 * run.t)[:, None], 4, 1), atol=1e-7
+    )
     np.testing.assert_array_equal(run.v, run.w)
 
 
@@ -156,7 +163,11 @@ def test_mean_frequency_of_an_undirected_network_without_lag_is_kept():
     omega = natural_frequencies(network.n_nodes, "lorentzian", width=0.3, seed=1)
     run = simulate(
         KuramotoSakaguchi(network, coupling=0.4, omega=omega),
-        phase0=np.zeros(network.n_nodes), t_end=20.0, t_step=1.0, rtol=1e-8, atol=1e-10,
+        phase0=np.zeros(network.n_nodes),
+        t_end=20.0,
+        t_step=1.0,
+        rtol=1e-8,
+        atol=1e-10,
     )
     np.testing.assert_allclose(run.phase.mean(axis=1), omega.mean() * run.t, rtol=0, atol=1e-7)
 
@@ -203,11 +214,17 @@ def test_wrong_frequencies_are_refused(given, words):
     [
         (lambda: KuramotoSakaguchi(complete(4), coupling=math.inf), "coupling = inf: a finite"),
         (lambda: KuramotoSakaguchi(complete(4), omega=[1.0]), r"omega has shape \(1,\): needed is"),
-        (lambda: StuartLandau(complete(4), omega=[math.nan] * 4), "omega holds values that are not"),
+        (
+            lambda: StuartLandau(complete(4), omega=[math.nan] * 4),
+            "omega holds values that are not",
+        ),
         (lambda: NetworkFHN(complete(4), epsilon=0.0), "epsilon = 0.0: must be above 0"),
-        (lambda: NetworkFHN(Network(3, np.array([[0, 1]]))), r"node 2 has no links \(degree 0\)"),
+        (lambda: NetworkFHN(Network(3, np.array([[0, 1]]))), "node 2 has no links"),
         (lambda: SimplicialKuramoto(complete(4), order=3), "order = 3: allowed are 0"),
-        (lambda: SimplicialKuramoto(complete(4), order=2), "order = 2: the network has no triangles"),
+        (
+            lambda: SimplicialKuramoto(complete(4), order=2),
+            "the network has no triangles",
+        ),
         (lambda: SimplicialKuramoto(random_complex(0)), "simplicial_kuramoto knows no weights"),
         (lambda: SimplicialKuramoto(complete(4), explosive=True), "with_triangles adds triangles"),
         (lambda: SimplicialKuramoto(DIRECTED), "a directed network has no orientation"),
@@ -228,7 +245,9 @@ def test_start_of_another_kind_is_refused():
         simulate(planar, u0=np.zeros(4))
     with pytest.raises(BadInput, match=r"phase0 has shape \(3,\): needed is \(4,\)"):
         simulate(phases, phase0=np.zeros(3))
-    with pytest.raises(BadInput, match="a Network, a model or an OwnModel is needed, not 'kuramoto"):
+    with pytest.raises(
+        BadInput, match="a Network, a model or an OwnModel is needed, not 'kuramoto"
+    ):
         simulate("kuramoto_sakaguchi", phase0=np.zeros(3))
     with pytest.raises(AttributeError, match="stuart_landau has no phases"):
         _ = simulate(planar, u0=np.zeros(4), v0=np.zeros(4), t_end=0.1).phase

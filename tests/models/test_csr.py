@@ -1,0 +1,94 @@
+"""Packed matrices: what a kernel multiplies with is the matrix, and equal rows are found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from networks_for_tests import complete, random_complex, two_populations
+from scipy.sparse import csr_array
+
+from chimera_hpc.models.csr import Packed, pack, packed
+
+
+def unpacked(found: Packed, number: int = 0) -> np.ndarray:
+    """Read a matrix back, entry by entry."""
+    ints = found.integers
+    rows, shared, start, column, value, label = ints[6 * number : 6 * number + 6].tolist()
+    table = []
+    for i in range(shared or rows):
+        begin, end = ints[start + i : start + i + 2].tolist()
+        columns = ints[column + begin : column + end]
+        assert (np.diff(columns) > 0).all()
+        table.append((columns, ints[value + begin : value + end].view(np.float64)))
+    width = 1 + max(max(columns, default=0) for columns, _ in table)
+    matrix = np.zeros((rows, max(width, rows if shared else 0)))
+    for i in range(rows):
+        columns, values = table[ints[label + i] if shared else i]
+        matrix[i, columns] = values
+        if shared:
+            matrix[i, i] += ints[label + rows + i : label + rows + i + 1].view(np.float64)[0]
+    return matrix
+
+
+COMPLETE = np.ones((12, 12)) - np.eye(12)
+BIPARTITE = np.kron([[0, 1], [1, 0]], np.ones((6, 6)))
+
+
+@pytest.mark.parametrize(
+    ("matrix", "n_shared", "n_entries"),
+    [
+        (COMPLETE, 1, 12),
+        (12 * np.eye(12) - np.ones((12, 12)), 1, 12),
+        (BIPARTITE, 2, 12),
+        (np.kron([[0.6, 0.4], [0.4, 0.6]], np.ones((6, 6))) - 0.6 * np.eye(12), 2, 24),
+        (COMPLETE + np.diag(np.arange(12.0)), 1, 12),
+        (np.eye(12), 0, 12),
+        (np.zeros((12, 12)), 0, 0),
+        # One entry less, and nothing but equal rows would be wrong.
+        (COMPLETE * (np.arange(144).reshape(12, 12) != 1), 2, 22),
+        (np.arange(144.0).reshape(12, 12), 0, 143),
+    ],
+)
+def test_equal_rows_are_stored_once(matrix, n_shared, n_entries):
+    found = pack(csr_array(matrix))
+    np.testing.assert_array_equal(unpacked(found), matrix[:, : unpacked(found).shape[1]])
+    assert (found.n_shared, found.n_entries) == (n_shared, n_entries)
+    assert found.kernel.startswith(f"{n_shared} shared rows" if n_shared else "sparse rows")
+
+
+def test_large_populations_share_two_rows():
+    for which in ("adjacency", "differences", "mean"):
+        found = packed(two_populations(150, 0.2), which)
+        assert found.n_shared == 2
+    assert packed(complete(60), "laplacian").n_entries == 60
+
+
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_matrices_of_a_network(k):
+    network = random_complex(3)
+    dirac = network.dirac(k).toarray()
+    found = packed(network, "dirac", k)
+    np.testing.assert_array_equal(unpacked(found), dirac)
+    np.testing.assert_array_equal(unpacked(found, 1), dirac.T)
+    assert found.integers[12] == (0, network.n_nodes, network.n_links)[k]
+    laplacian = unpacked(packed(network, "laplacian", k))
+    np.testing.assert_array_equal(laplacian, network.laplacian(k).toarray())
+    assert packed(network, "dirac", k) is found
+
+
+def test_key_tells_matrices_apart():
+    network = random_complex(3)
+    keys = {packed(network, which).key for which in ("adjacency", "differences", "mean")}
+    keys |= {packed(network.with_weights(None), "adjacency").key}
+    assert len(keys) == 4
+    again = packed(random_complex(3), "adjacency")
+    assert again.key == packed(network, "adjacency").key
+
+
+def test_the_callers_matrix_is_left_alone():
+    matrix = csr_array(
+        (np.array([1.0, 2.0, 3.0]), np.array([2, 0, 1]), np.array([0, 2, 3])), (2, 3)
+    )
+    before = matrix.indices.copy()
+    np.testing.assert_array_equal(unpacked(pack(matrix)), matrix.toarray())
+    np.testing.assert_array_equal(matrix.indices, before)
