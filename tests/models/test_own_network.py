@@ -138,5 +138,5 @@ def test_error_in_a_right_hand_side_on_a_network_is_one_line():
     def wrong(y, dy, p, ints, network):
         dy[0, 0] = network.degree[0]
 
-    with pytest.raises(BadInput, match="right_hand_side does not compile: TypingError: .*degree"):
+    with pytest.raises(BadInput, match=r"right_hand_side does not compile: TypingError: .*degree"):
         _ = OwnModel(wrong, variables=("x",), network=True).compiled
