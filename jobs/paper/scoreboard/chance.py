@@ -7,7 +7,10 @@ atlases, the analyses, the judgement of the claim. No run is computed again.
 
 from __future__ import annotations
 
+import multiprocessing
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,13 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.reduction.analyses import analyse
+from chimera_hpc.job.registry import ANALYSES, load
 from chimera_hpc.reduction.analysis_input import AnalysisInput
 from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
-from chimera_hpc.reduction.results import TRIPLET, build_results
+from chimera_hpc.reduction.results import TRIPLET, build_results, json_safe
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.store import Store
 from scoreboard.causes import Cause, explain
@@ -117,27 +122,69 @@ class RedrawnEvidence(Evidence):
             cut=next(iter(classes.cuts.values())),
             atlases={name: Atlas.of(self._redrawn(name)[1]) for name in spec.atlas},
         )
-        curves = analyse(given, lambda line: None)
-        return build_results(runs.sweep, runs.points, {"status": runs.status}, classes, curves)
+        made = build_results(runs.sweep, runs.points, {"status": runs.status}, classes, {})
+        return made | {"curves": _Curves(given)}
+
+
+class _Curves(dict[str, Any]):
+    """The analyses of a job, each made when a rule first looks at it."""
+
+    def __init__(self, given: AnalysisInput) -> None:
+        super().__init__()
+        self._given = given
+
+    def __missing__(self, name: str) -> Any:
+        if name not in self._given.sweep.reduction.analyses:
+            raise KeyError(name)
+        try:
+            self[name] = json_safe(load(ANALYSES[name])(self._given))
+        except BadInput:
+            raise KeyError(name) from None
+        return self[name]
 
 
 def chances(
-    claims: Sequence[PaperClaim], folder: str | Path, convention: str = OWN, draws: int = DRAWS
-) -> dict[str, dict[str, int]]:
-    """Return by the claim's id in how many of how many draws it holds.
+    claims: Sequence[PaperClaim], folder: Path, convention: str, draws: range
+) -> dict[str, Counter[str]]:
+    """Return by the claim's id in how many of how many draws it ``holds``.
 
-    Draws in which a claim can't be decided are not counted; a claim that is decided in none is
-    left out.
+    Draws in which a claim can't be decided are not counted.
     """
     runs: dict[str, Runs] = {}
-    found = {claim.id: {"holds": 0, "of": 0} for claim in claims}
-    for draw in range(draws):
+    found = {claim.id: Counter(holds=0, of=0) for claim in claims}
+    for draw in draws:
         evidence = RedrawnEvidence(folder, runs, draw, convention)
         for claim in claims:
             outcome = claim.judge(evidence)
             found[claim.id]["of"] += outcome.outcome != NOT_DECIDABLE
             found[claim.id]["holds"] += outcome.outcome == REPRODUCED
-    return {name: count for name, count in found.items() if count["of"]}
+    return found
+
+
+def chances_by_convention(
+    claims: Sequence[PaperClaim], folder: Path, draws: int
+) -> dict[str, dict[str, dict[str, int]]]:
+    """Return the `chances` of the claims under each convention, computed by all cores.
+
+    A claim that is decided in no draw is left out.
+    """
+    names = {DEFAULT: OWN, PRINTED: PRINTED}
+    cores = usable_cores()
+    parts = [range(first, draws, cores) for first in range(min(cores, draws))]
+    found = {name: {claim.id: Counter(holds=0, of=0) for claim in claims} for name in names}
+    with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
+        work = {
+            pool.submit(chances, claims, folder, names[name], part): name
+            for name in names
+            for part in parts
+        }
+        for done, name in work.items():
+            for claim, count in done.result().items():
+                found[name][claim].update(count)
+    return {
+        name: {claim: dict(count) for claim, count in made.items() if count["of"]}
+        for name, made in found.items()
+    }
 
 
 def add_causes(
@@ -151,11 +198,11 @@ def add_causes(
 
     Without draws, how often chance would have a claim hold is left out.
     """
-    names = {DEFAULT: OWN, PRINTED: PRINTED}
+    names = (DEFAULT, PRINTED)
     lost = [row for row in rows if not any(finding(row, name)["reproduced"] for name in names)]
     failed = {row["id"] for row in lost if row["reproduced"] is False}
     chosen = [claim for claim in claims if claim.id in failed] if draws else []
-    counts = {name: chances(chosen, folder, names[name], draws) for name in names}
+    counts = chances_by_convention(chosen, folder, draws)
     for row in rows:
         if row["id"] in failed:
             chance = {name: made[row["id"]] for name, made in counts.items() if row["id"] in made}
