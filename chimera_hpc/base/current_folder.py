@@ -1,7 +1,7 @@
-"""``python -m`` puts the current folder first on the Python path; this takes it off again.
+"""Take the current folder off the Python path, where ``python -m`` puts it first.
 
-A numpy.py or json.py there must not stand in for a library, neither here nor in the processes that
-this one starts, which is what ``python -P`` is for.
+A numpy.py or json.py in the current folder must not replace a library, neither in this process nor
+in the processes that it starts. ``python -P`` has the same effect.
 """
 
 import os

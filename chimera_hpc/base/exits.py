@@ -15,16 +15,16 @@ class Exit(IntEnum):
     BAD_INPUT = 2
     """Wrong input. One line says what, where and what is allowed."""
     NO_OUTPUT = 74
-    """What the command prints could not be written, as on a full disk."""
+    """The output of the command could not be written, for example because the disk is full."""
     MORE_TO_DO = 75
-    """Points are pending: stopped in good order (SIGTERM, SIGUSR1, end of a job), or more points
-    were added meanwhile. The same command continues."""
+    """Points are pending: the command was stopped cleanly (SIGTERM, SIGUSR1, end of a job), or
+    points were added during the run. The same command continues."""
     INTERRUPTED = 130
     """Stopped by Ctrl-C; the same command continues."""
 
     @classmethod
     def of_points(cls, pending: int, failed: int) -> Exit:
-        """Return the status of a sweep with so many points that did not run, or failed."""
+        """Return the exit status of a sweep with these numbers of pending and failed points."""
         if pending:
             return cls.MORE_TO_DO
         return cls.FAILURES if failed else cls.COMPLETE

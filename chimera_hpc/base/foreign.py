@@ -1,4 +1,4 @@
-"""Code that may never return: since when the threads of this process have been in it."""
+"""Record when each thread of this process entered a user's code, which may never return."""
 
 from __future__ import annotations
 
@@ -29,5 +29,8 @@ def foreign_code() -> Iterator[None]:
 
 
 def first_entry() -> float | None:
-    """Return when the thread that has been in such code for longest entered it (monotonic, s)."""
+    """Return the earliest entry of a thread that is still in such code, or None.
+
+    The time is that of the monotonic clock (s).
+    """
     return min(_entered.copy().values(), default=None)

@@ -1,4 +1,4 @@
-"""Where a user's own files may lie: the home folder and, where that is of no use, a stand-in."""
+"""Folders for a user's own files: the home folder or, if it cannot be used, a substitute."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from pathlib import Path
 
 
 def home_folder() -> Path:
-    """Return the user's home; without one, as in a container with a bare user id, a stand-in.
+    """Return the user's home folder, or a substitute if there is none.
 
-    Then ``$HOME`` is set: other packages, such as Bokeh, cannot be imported without it.
+    A container with a bare user id has no home folder. ``$HOME`` is then set to the substitute,
+    because other packages, such as Bokeh, cannot be imported without it.
     """
     try:
         return Path.home()
@@ -29,14 +30,14 @@ def private_folder() -> Path:
     folder = Path(tempfile.gettempdir()) / f"chimera_hpc-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
     found = folder.lstat()
-    # Anybody may make this name in /tmp: what others can write is not to be executed.
+    # Any user can create this name in /tmp. Files that others can write must not be executed.
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o022:
         raise PermissionError(13, "is not a folder of this user alone", str(folder))
     return folder
 
 
 def is_writable(folder: Path) -> bool:
-    """Return whether files can be made in `folder`, which is made if it does not exist."""
+    """Return whether files can be created in `folder`, which is created if it does not exist."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -45,10 +46,10 @@ def is_writable(folder: Path) -> bool:
 
 
 def prepare_home() -> None:
-    """See to it that other packages find a home folder, and matplotlib one for its list of fonts.
+    """Provide a home folder for other packages, and a folder for matplotlib's list of fonts.
 
-    Where its own folder cannot be written, matplotlib would warn, and look for all fonts again in
-    each process. To be called before it is imported.
+    If matplotlib cannot write to its own folder, it warns and searches for all fonts again in each
+    process. Call this function before matplotlib is imported.
     """
     home = home_folder()
     if "MPLCONFIGDIR" in os.environ:
@@ -61,7 +62,7 @@ def prepare_home() -> None:
 
 
 def user_name() -> str:
-    """Return the user's name, or the number of a user without one."""
+    """Return the user's name, or the user id if it has no name."""
     try:
         return getpass.getuser()
     except (KeyError, OSError, ImportError):

@@ -25,7 +25,7 @@ class Status(IntEnum):
         return _SENTENCES[self]
 
     def reason(self, steps: int) -> str:
-        """Return the outcome of a point that made so many steps in words."""
+        """Return the outcome in words, for a point that made `steps` steps."""
         if self is Status.TIME_OUT and not steps:
             return _HANG
         return self.sentence

@@ -100,7 +100,7 @@ def axes_of(model: ModelParameters, grid: Mapping[str, Axis], fixed: Fixed) -> d
 
 
 def axis_parameter(model: ModelParameters, name: str) -> Parameter:
-    """Return the parameters that an axis may have: those of the model and the radius `delta`."""
+    """Return the parameter of an axis: one of the model, or the radius `delta`."""
     parameter = DELTA if name == "delta" else model.find(name)
     if parameter is None:
         known = [*(p.name for p in model.parameters), "delta", "seeds"]

@@ -46,7 +46,7 @@ def built_in() -> dict[str, ModelParameters]:
 def build(sweep: Sweep, row: Mapping[str, int | float]) -> Model:
     """Return the model of one point of a sweep, from its row of columns.
 
-    Parameters that a user's model has had only since the sweep was planned have their defaults.
+    A parameter that was added to a user's model after the sweep was planned has its default.
     """
     kind = model_kind(sweep.model, sweep.origin)
     if ":" not in sweep.model:

@@ -20,8 +20,8 @@ MAX_POINTS = 10**8
 DTYPES: dict[type, type[np.int64] | type[np.float64]] = {int: np.int64, float: np.float64}
 _MAX_CODE = 2**62
 ULPS = 4
-"""How far a float may be from the one that is meant, in units in the last place: as far as two ways
-to compute the same fraction differ."""
+"""Largest distance, in units in the last place, at which two floats count as the same fraction. Two
+ways to compute a fraction may differ by this much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +58,11 @@ class Points:
         return {name: column[i].item() for name, column in self.columns.items()}
 
     def find(self, **values: float) -> NDArray[np.int64]:
-        """Return the indices of the points with these values, rising.
+        """Return the indices of the points with these values, in increasing order.
 
-        Integers are compared exactly, all 64 bits of them. A float means the points that hold it
-        exactly; without such a point, those of the one value within `ULPS` units in the last place.
+        Integers are compared exactly, with all 64 bits. A float selects the points that hold
+        exactly this value. If there are none, it selects those of the only value within `ULPS`
+        units in the last place.
 
         Raises BadInput for an unknown name, and for a float that is near to several values but
         equal to none.
@@ -103,7 +104,7 @@ class Points:
 
 
 def _holds(name: str, column: Column, value: float) -> NDArray[np.bool_]:
-    """Tell where a column holds a value, as `Points.find` means it."""
+    """Return where a column holds a value, by the rules of `Points.find`."""
     if column.dtype.kind != "f":
         # NumPy compares an integer with a Python integer exactly, but with a float as floats.
         whole = math.isfinite(value) and int(value) == value

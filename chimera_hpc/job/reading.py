@@ -55,9 +55,9 @@ def apply_overrides(
     """Return the data with each KEY=VALUE applied.
 
     KEY is `table.key`, or a bare key: name, title, model; `seeds`; a parameter of the model; or a
-    key of exactly one other table. A parameter is set in [grid] if it is an axis already or if the
-    value is one (a list, a range, a name), else in [fixed]. A preset replaces what the data say of
-    its settings. VALUE is TOML, or bare text such as 3:8, P or sine-fit. `origin` tells where a
+    key of exactly one other table. A parameter is set in [grid] if it is already an axis or if the
+    value describes one (a list, a range, a name), else in [fixed]. A preset replaces the settings
+    that it defines. VALUE is TOML, or bare text such as 3:8, P or sine-fit. `origin` tells where a
     user's model comes from.
     """
     changed = {key: dict(v) if isinstance(v, dict) else v for key, v in data.items()}

@@ -272,14 +272,14 @@ class Keep(Table):
     )
 
     def with_dtype(self, dtype: Literal["int16", "float32"]) -> Keep:
-        """Return the same with another default of `dtype`, which a job may override."""
+        """Return a copy with another default of `dtype`, which a job may override."""
         if "dtype" in self.model_fields_set:
             return self
         values = {**dict(self), "dtype": dtype}
         return Keep.model_construct(_fields_set={*self.model_fields_set}, **values)
 
     def fits(self, stored: Keep) -> bool:
-        """Return whether a store has what a job asks for, as far as the job does."""
+        """Return whether a store keeps what a job asks for. A `dtype` that is not set fits any."""
         return self.with_dtype(stored.dtype) == stored
 
 

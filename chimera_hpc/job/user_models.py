@@ -27,7 +27,7 @@ from chimera_hpc.models.source import SourceFiles, module_file, source_files
 
 _MODULE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 _appended: list[str] = []
-"""The folder of the last model that was imported, where it stands on the Python path for that."""
+"""The folder of the last imported model, if its import appended it to the Python path."""
 _WHERE = "it must be in the job's folder, the current one, or on PYTHONPATH"
 
 
@@ -38,10 +38,10 @@ class Origin:
     folders: tuple[str, ...] = ()
     """Folders in which the module of a user's model is looked for first."""
     table: ModelParameters | None = None
-    """Its parameters as a store has them: with these the module is imported to compute only."""
+    """Its parameters as a store keeps them. The module is then imported only to compute points."""
 
     def before(self, other: Origin) -> Origin:
-        """Return the same with the folders of another one behind its own."""
+        """Return a copy with the folders of `other` after its own."""
         return Origin(tuple(dict.fromkeys((*self.folders, *other.folders))), self.table)
 
 
@@ -81,7 +81,7 @@ def user_source(name: str, origin: Origin) -> SourceFiles | None:
 
 @contextmanager
 def prints_to_stderr() -> Iterator[None]:
-    """Let what a user's code prints go to stderr: stdout is for results."""
+    """Redirect the output of a user's code to stderr, because stdout is for results."""
     with redirect_stdout(sys.stderr):
         yield
 
@@ -199,7 +199,7 @@ def _import_top(top: str, found: SourceFiles) -> None:
 
 
 def _forget(top: str, file: Path | None) -> None:
-    """Remove another model of the name, with the modules next to it, as if never imported."""
+    """Remove the imported modules of this name, and those next to the model, from `sys.modules`."""
     beside = set() if file is None else set(source_files(file, top).modules)
     for name in [*sys.modules]:
         if name.partition(".")[0] in {top, *beside}:

@@ -15,7 +15,7 @@ _PHASE = 2
 def average(values: Any, counts: Any, circular: bool, out: Any) -> None:
     """Write means and standard deviations over windows of values (5, N, q) into out (9, N).
 
-    Of the last row, R^2, only the mean.
+    For the last row, R^2, only the mean is written.
     """
     for j in range(values.shape[1]):
         q = counts[j % counts.size]

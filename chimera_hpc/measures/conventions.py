@@ -1,4 +1,4 @@
-"""What the Fourier method may do differently: options, and the presets that set several at once.
+"""Options of the Fourier method, and the presets that set several options at once.
 
 The text of the paper leaves open which maxima place the windows, how many windows count, where
 phases begin and how they are averaged. `default` uses all of a recording, one clock for the ring

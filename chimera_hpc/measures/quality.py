@@ -19,8 +19,8 @@ def quality(features: FourierFeatures, step: float) -> tuple[float, float]:
     Samples per period are 1 / (Omega step) for the largest frequency Omega over the nodes. The
     fastest node counts, because V_Omega and V_a compare all nodes: one node that is sampled too
     coarsely moves the class of the run. R^2 is the median over the nodes of
-    `FourierFeatures.r_squared`, which tells whether a sine describes the run as a whole. A chimera
-    may hold some nodes that are no sines. Constant nodes count for neither.
+    `FourierFeatures.r_squared`, which tells whether a sine describes the run as a whole. In a
+    chimera, some nodes may not be sinusoidal. Both numbers ignore constant nodes.
 
     Parameters
     ----------

@@ -13,12 +13,12 @@ from chimera_hpc.measures.checks import Array, floats, integer, node_rows
 
 # Largest distance of a time from the uniform grid, in steps.
 _UNIFORM = 1e-2
-# Factor between mean squares of steps along two axes from which the axes may be swapped.
+# Ratio of the mean squares of steps along the two axes above which the axes may be swapped.
 _SMOOTHER = 4.0
-# Standard deviation, in root mean squares of u, above which a steady run may be an oscillation.
+# Standard deviation over root mean square of u above which a steady run may be an oscillation.
 _SMALL = 1e-2
 _MOST_NAMED = 5
-# Fewest samples from which a signal without a turn is suspicious.
+# Least number of samples for which a signal that only rises or falls is suspicious.
 _FEWEST = 20
 
 
@@ -55,7 +55,7 @@ def checked_signals(t: ArrayLike, u: ArrayLike) -> CheckedSignals:
 
 
 def suspect_signals(x: Array) -> list[str]:
-    """Return a line for each thing that makes signals x (N, T) look like none, with what to do."""
+    """Return a line, with advice, for each sign that x (N, T) may not hold the signals meant."""
     steps = np.diff(x, axis=1)
     constant = (steps == 0.0).all(axis=1)
     one_way = ((steps >= 0.0).all(axis=1) | (steps <= 0.0).all(axis=1)) & ~constant
@@ -77,7 +77,7 @@ def suspect_signals(x: Array) -> list[str]:
 
 
 def suspect_steadiness(x: Array, deviation: float, threshold: float) -> list[str]:
-    """Return a line if an absolute threshold made signals x (N, T) steady that vary by much."""
+    """Return a line if an absolute threshold made signals x (N, T) steady that vary much."""
     if deviation < _SMALL * float(np.sqrt(np.mean(np.square(x)))) or deviation == 0.0:
         return []
     return [

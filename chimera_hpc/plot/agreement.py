@@ -43,7 +43,7 @@ def verdicts_figure(data: FigureInput) -> Figure | None:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Counts (k, k) of runs that one method calls row and the other column."""
+    """Counts (k, k) of runs: rows are classes of one method, columns are classes of the other."""
 
     rows: str
     columns: str

@@ -45,8 +45,8 @@ def animate_ring(
 ) -> None:
     """Write one frame for each sample of u and w, both (T, N), at the times t (T,).
 
-    On the ring, node 0 is on the right and the others follow counter-clockwise; u moves a node
-    outwards and gives its colour, which it keeps in the plane (u, w).
+    On the ring, node 0 is on the right and the others follow counter-clockwise. u moves a node
+    outwards and sets its colour. A node has the same colour in the plane (u, w).
 
     Raises BadInput: as `check_film`.
     """
@@ -74,7 +74,7 @@ def animate_ring(
         plane.set(xlabel="$u_i$", ylabel="$w_i$")
         figure.colorbar(nodes, ax=ring, label="$u_i(t)$", shrink=0.8, pad=0.02)
         clock = figure.suptitle(f"{title}   t = {time[-1]:.2f}".strip())
-        # Where the panels are is found once: finding it takes longer than a frame.
+        # The layout is computed once, because it takes longer than a frame.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
         film = Path(folder) / path.name

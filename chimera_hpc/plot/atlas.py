@@ -32,10 +32,10 @@ class Diamonds:
 
 
 def atlas_figure(data: FigureInput) -> Figure | None:
-    """Draw a diamond for each cell over the judge's classes (paper figs. 7, 8).
+    """Draw the mean of each cell as a diamond over the classes of the atlas (paper figs. 7, 8).
 
-    One panel for each value of the first axis, coloured by the second; with one axis, one panel
-    that is coloured by it.
+    There is one panel for each value of the first axis, and colours show the second axis. With one
+    axis, there is one panel, and colours show this axis.
     """
     entry = data.curves.get("atlas")
     if entry is None or not data.axes:

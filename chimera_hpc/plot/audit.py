@@ -14,16 +14,16 @@ from chimera_hpc.classify.resampling import FIRM
 from chimera_hpc.plot import style
 
 _HEIGHT = 0.75
-"""Of the panel, in inches."""
+"""Height of the panel, in inches."""
 
 
 def add_kept_panel(
     figure: Figure, axes: Axes, x: ArrayLike, classes: Sequence[str | None], kept: ArrayLike
 ) -> None:
-    """Put a panel below `axes`, a bar for each x (k,): how often the cell keeps its class.
+    """Add a panel below `axes` with a bar for each x (k,): how often the cell keeps its class.
 
-    `kept` (k,) is the share of the resamplings of its seeds, NaN where there are too few; bars
-    have the colour of the class, and the dashed line is the level that counts as firm.
+    `kept` (k,) is the share of the resamplings of its seeds, NaN if there are too few seeds. A bar
+    has the colour of the class. The dashed line is the level from which a class is firm.
     """
     values, shares = np.asarray(x, dtype=np.float64), np.asarray(kept, dtype=np.float64)
     width, height = figure.get_size_inches()
@@ -53,7 +53,7 @@ def open_loose_cells(
     classes: Sequence[str | None],
     kept: ArrayLike,
 ) -> list[Line2D]:
-    """Open the markers of the cells that are not firm; return what the legend says of it.
+    """Draw open markers for the cells that are not firm; return the entries of the legend.
 
     `parameters` are label and value (k,) of two parameters, `kept` (k,) is the share of the
     resamplings of a cell's seeds that keep its class.

@@ -1,8 +1,8 @@
 """The figures of a sweep by name.
 
 For developers: a figure is one file in this folder, with a function that takes a `FigureInput`
-(and the number of clusters, where it shows one cut) and returns the figure, or None where the
-sweep has nothing for it to show; and one line in `job.registry`.
+(and the number of clusters, where it shows one cut) and returns the figure, or None if the
+sweep has no data for it. It also needs one line in `job.registry`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Maker = Callable[[FigureInput], Figure | None]
 
 
 def choose(asked: str | Sequence[str], cuts: Sequence[int]) -> dict[str, Maker | None]:
-    """Return by file name what draws each figure that is asked for.
+    """Return the functions that draw the requested figures, by file name.
 
-    "auto" asks for all figures: those of a cut for the first of `cuts`, and the composite figure
-    for every one. A name without a number is for every cut. None stands for a figure of a cut that
-    the sweep does not have.
+    "auto" requests all figures. Figures of one cut are then drawn for the first of `cuts`, and the
+    composite figure for each of them. A name without a number requests every cut. The value is None
+    for a figure of a cut that the sweep does not have.
     """
     if isinstance(asked, str):
         first = [f"{name}_{k}" for name in CUT_FIGURES for k in cuts[:1]]

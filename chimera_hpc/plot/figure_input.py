@@ -1,4 +1,4 @@
-"""What the figures of a sweep are drawn from."""
+"""The input of the figures of a sweep."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class FigureInput:
     triplets: Array
     """(n, 3) V_theta, V_a, V_Omega"""
     axes: Sequence[tuple[str, NDArray[Any]]]
-    """Label and value in each cell (n_cells,) of what varies between cells."""
+    """Parameters that vary between cells: label, and value in each cell (n_cells,)."""
     cells: Mapping[int, Sequence[Mapping[str, Any]]]
     """For each cut its cells (n_cells,) with ``class`` and ``votes``."""
     kept: Mapping[int, Array] = field(default_factory=dict)
-    """For each cut how often each cell (n_cells,) keeps its modal class, where an audit says so."""
+    """For each cut, how often a cell (n_cells,) keeps its modal class; empty without an audit."""
     curves: Mapping[str, Any] = field(default_factory=dict)
-    """What analyses made, as in results.json."""
+    """Results of the analyses, as in results.json."""
     beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """``curves`` of the sweeps that are drawn with this one, by their names."""
     shown: Sequence[DrawnRun] = ()

@@ -96,8 +96,8 @@ def incoherence_sensitivity(
 ) -> Figure:
     """Draw the mean SI (k, d) over a parameter x (k,) and the threshold delta (d,), as a map.
 
-    `marks` are thresholds that stand as lines: how fast the colour changes across a line is how
-    much the verdict hangs on the threshold.
+    `marks` are thresholds that are drawn as lines. The faster the colour changes across a line, the
+    more the result depends on the threshold.
     """
     figure, (axes,) = style.new_panels(1, style.COLUMN + 1.4, 3.0)
     mesh = style.draw_shares(axes, x, delta, strength)

@@ -56,7 +56,7 @@ def profiles_of(features: ArrayLike) -> IndicatorProfiles:
 
 
 STEPS = 400
-"""Most nodes that are drawn one by one; of more, as many steps are drawn."""
+"""Largest number of nodes that are drawn one by one. More nodes are drawn as this many steps."""
 SYMBOLS = (r"V_\theta", "V_a", r"V_\Omega")
 _ROWS = (
     ("phase", r"$\langle\theta_i\rangle$ (rad)"),
@@ -71,7 +71,7 @@ def fourier_indicators(
 ) -> Figure:
     """Draw a column for each run: means as dots, one standard deviation to each side as a band.
 
-    `names` (N,) of the nodes stand along their axis, by default their numbers from 0.
+    `names` (N,) of the nodes label their axis. The default is their numbers from 0.
     """
     figure = style.new_figure(max(style.COLUMN, 2.35 * len(runs)), 4.6)
     axes = figure.subplots(3, len(runs), squeeze=False, sharex="col")
@@ -95,8 +95,9 @@ def fourier_indicators(
 def _draw_profile(axes: Axes, mean: ArrayLike, deviation: ArrayLike, period: float) -> None:
     """Draw dots and, where the deviation is known (two windows or more), the band.
 
-    A quantity with a period (0: none) has its band repeated one period above and below. Of many
-    nodes, what a few of them reach is drawn as one step: their means dark, the band light.
+    If the quantity has a period (0: none), the band is repeated one period above and below. With
+    many nodes, a few of them share one step from their smallest to their largest value: dark for
+    the means, light for the band.
     """
     values = np.asarray(mean, dtype=np.float64)
     half = np.asarray(deviation, dtype=np.float64)
@@ -116,7 +117,7 @@ def _draw_profile(axes: Axes, mean: ArrayLike, deviation: ArrayLike, period: flo
     axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], integer=True))
     spread = np.nanmax(values) - np.nanmin(values)
     if spread < 1e-3 * max(1.0, float(np.nanmax(np.abs(values)))):
-        # Rounding would fill the panel and look like structure.
+        # Otherwise rounding errors would fill the panel and look like structure.
         centre = float(np.nanmean(values))
         reach = max(0.05 * abs(centre), 1.5 * float(np.nanmax(np.nan_to_num(half))), 1e-3)
         axes.set_ylim(centre - reach, centre + reach)

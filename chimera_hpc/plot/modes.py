@@ -19,7 +19,7 @@ from chimera_hpc.plot.figure_input import FigureInput
 Array = NDArray[np.float64]
 
 _WHOLE = 90.0
-"""Area of the disc of all votes, in points squared."""
+"""Area of a disc that stands for all votes of a cell, in points squared."""
 _SHARES = (0.1, 0.5, 1.0)
 
 Classes = Sequence[str | None]
@@ -98,7 +98,7 @@ def _draw_against(axes: Axes, label: str, x: ArrayLike, classes: Classes, votes:
 
 
 def vote_handles() -> list[Line2D]:
-    """Return what a legend says of the sizes of discs."""
+    """Return the entries of a legend that explain the sizes of the discs."""
     look: dict[str, Any] = {"ls": "none", "marker": "o", "color": "#cccccc", "markeredgewidth": 0.0}
     return [
         Line2D([], [], markersize=(_WHOLE * share) ** 0.5, label=f"{share:.0%} of votes", **look)

@@ -17,7 +17,7 @@ _LAST_TURNS = 1.5
 """Periods of every node that are drawn behind it."""
 _MOST_ORBITS = 300
 _MANY = 2000
-"""Nodes beyond which not every orbit is drawn, and beyond which a PDF has dots as an image."""
+"""Largest number of nodes with all orbits drawn, and with dots as vectors in a PDF."""
 
 
 @style.styled
@@ -37,7 +37,7 @@ def ring_portrait(
     u, w: (T, N)
     node: its last twelve periods are drawn; of all nodes, in grey, the last one and a half.
     nullcline: whether the model has the cubic nullcline w = u - u^3 / 3.
-    period: length of a period; without it orbits are drawn whole.
+    period: length of a period; None: whole orbits are drawn.
     """
     figure, (axes,) = style.new_panels(1, style.COLUMN + 1.6, 3.2)
     time, across, along = (np.asarray(x) for x in (t, u, w))

@@ -20,7 +20,7 @@ from chimera_hpc.plot.figure_input import FigureInput
 LABELS = (r"$V_\theta$", r"$V_a$", r"$V_\Omega$ (1/time)")
 PLANES = ((0, 1), (0, 2), (1, 2))
 _MANY = 500
-"""Points beyond which a PDF holds dots instead of a path for each."""
+"""Number of points above which a PDF holds an image of them instead of a path for each."""
 
 
 def projections_figure(data: FigureInput, n_clusters: int) -> Figure | None:

@@ -1,7 +1,7 @@
 """Series at the resolution of a picture, in time and along the ring.
 
-A dot of a picture holds one sample where a few dots hold a period, and elsewhere how far u reaches
-in it: samples at equal distances would show patterns that are not there.
+If a period covers several dots of a picture, each dot shows one sample. Otherwise each dot shows
+the range of u within it, because equally spaced samples would show false patterns (aliasing).
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ ROWS, COLUMNS = 300, 600
 PERIODS = 12
 """Periods in a close-up."""
 _MOST_STRIDE = 8
-"""Nodes from a row to the next beyond which a close-up shows a part of the ring."""
+"""Largest step between the nodes of a close-up. Beyond it, a close-up shows a part of the ring."""
 _SOME_NODES = 64
 _FLAT = 1e-3
 """Range of a node, in units of the largest value, below which it does not oscillate."""
 _JUMPS = 0.4
-"""Share of dots with jumps up to which a picture can be read: five dots a period."""
+"""Largest share of dots with jumps in a readable picture: about five dots per period."""
 _PIECE = 2_000_000
-"""Samples that are looked at in one go."""
+"""Number of samples that are processed at once."""
 _GROUPS = 24
 _SMOOTH = 0.25
-"""Groups of neighbours that are compared; share of the whole range within which they are alike."""
+"""Number of groups of neighbours that are compared, and the share of the whole range within which
+neighbours are alike."""
 
 
 class NodeSeries(Protocol):
@@ -61,20 +62,20 @@ class Raster:
     stride: int = 1
     """Nodes from a row to the next."""
     length: str = ""
-    """What part of the series is drawn, of a close-up."""
+    """The part of the series that a close-up shows, in words."""
 
     @property
     def partly(self) -> str:
-        """Which nodes are drawn, where not all are."""
+        """The nodes that are drawn, in words; empty if all are drawn."""
         if self.stride > 1:
             return f"one node in {self.stride}"
         return "" if self.is_whole else f"nodes {self.nodes[0]} to {self.nodes[1] - 1}"
 
 
 def n_periods(u: NodeSeries) -> tuple[float, float]:
-    """Return the periods in a series: of its slow and of its fast nodes, by their mid-level.
+    """Return the number of periods of a slow and of a fast node, from crossings of the mid-level.
 
-    A tenth of the nodes that oscillate are slower, and a quarter faster; 0 where none oscillates.
+    These are the quantiles 0.1 and 0.75 over the nodes that oscillate; 0 if no node does.
     """
     rows = _some(u)
     low, high = np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
@@ -87,10 +88,10 @@ def n_periods(u: NodeSeries) -> tuple[float, float]:
 
 
 def overview(t: ArrayLike, u: NodeSeries, dots: int = COLUMNS) -> Raster:
-    """Return u over all times and nodes, or its range in each period where that is readable only.
+    """Return u over all times and nodes or, if the picture cannot resolve it, its range per period.
 
-    That is where u jumps within many of the `dots` along time, or where neighbours differ in all of
-    a ring of more nodes than a picture has rows.
+    The picture cannot resolve u that jumps within many of the `dots` along time. The same holds if
+    the ring has more nodes than the picture has rows, and neighbours differ all around the ring.
     """
     time, slow = np.asarray(t, dtype=np.float64), n_periods(u)[0]
     stride = -(-u.shape[0] // ROWS)
@@ -109,8 +110,8 @@ def close_up(
 ) -> Raster:
     """Return u over the last periods, at most over half of the series.
 
-    A ring of more nodes than rows is shown at some nodes where neighbours are alike in a part of
-    it, elsewhere at its first nodes.
+    If the ring has more nodes than rows, equally spaced nodes are shown if neighbours are alike in
+    a part of the ring. Otherwise the first nodes are shown.
     """
     time, periods = np.asarray(t, dtype=np.float64), n_periods(u)[1]
     share = min(0.5, shown / max(periods, shown))
@@ -153,12 +154,12 @@ def envelope(u: NodeSeries, rows: int, columns: int) -> tuple[Array, Array]:
 
 
 def bins(n: int, parts: int) -> NDArray[np.int64]:
-    """Return the first of each of at most so many parts of 0..n-1, as equal as may be."""
+    """Divide 0..n-1 into at most `parts` nearly equal parts; return the first number of each."""
     return np.unique(np.linspace(0, n, min(parts, n) + 1).astype(np.int64)[:-1])
 
 
 def _pieces(starts: NDArray[np.int64], n_nodes: int, n_times: int) -> Iterator[tuple[slice, slice]]:
-    """Yield some rows of the picture with their nodes, few enough samples at a time."""
+    """Yield groups of rows of the picture and their nodes, about `_PIECE` samples at a time."""
     ends = np.append(starts[1:], n_nodes)
     at_once = max(1, _PIECE // max(1, n_times * int((ends - starts).max())))
     for i in range(0, len(starts), at_once):
@@ -176,7 +177,7 @@ def _some(u: NodeSeries) -> Array:
 
 
 def _is_slow(u: NodeSeries, dots: int) -> bool:
-    """Whether u goes through half of its range in few of so many dots along time."""
+    """Whether u changes by more than half of its range within few of the `dots` along time."""
     rows = _some(u)
     low, high = envelope(rows, len(rows), dots)
     following = rows[:, bins(rows.shape[1], dots)[1:]]
@@ -188,7 +189,7 @@ def _is_slow(u: NodeSeries, dots: int) -> bool:
 
 
 def _is_smooth(u: NodeSeries, stride: int) -> bool:
-    """Whether, in a fifth of the ring, u is alike at `stride` nodes at a time."""
+    """Whether u is alike at `stride` neighbouring nodes in at least a fifth of the ring."""
     size = min(stride, _SOME_NODES)
     groups = np.stack([u[i : i + size] for i in bins(u.shape[0] - size + 1, _GROUPS).tolist()])
     differences = np.ptp(groups, axis=1).mean(axis=-1)

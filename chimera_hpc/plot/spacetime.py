@@ -48,9 +48,9 @@ def space_time(
 ) -> Figure:
     """Draw one panel for each (t, u): t (T,) uniform, u (N, T); one colour scale for all.
 
-    Where a series holds more periods than a panel can show, the panel has the range of u in each
-    period, and below each panel are the last twelve periods of its run. `names` (N,) of the nodes
-    stand along their axis, by default their numbers from 0.
+    If a series has more periods than a panel can show, the panel shows the range of u in each
+    period, and a panel below it shows the last twelve periods of the run. `names` (N,) of the nodes
+    label their axis. The default is their numbers from 0.
     """
     columns = 2 if len(panels) == 4 and columns > 2 else min(columns, len(panels))
     upper = [overview(t, u, _DOTS // columns) for t, u in panels]
@@ -112,7 +112,7 @@ def _largest(rasters: Iterable[Raster], is_range: bool) -> float:
 
 
 def _add_bars(figure: Figure, axes: NDArray[Any], symbol: str, apart: bool) -> None:
-    """Put a bar of colours for u, and one for its range, next to all panels or to their own row."""
+    """Add a colour bar for u and one for its range, next to all panels or next to their own row."""
     labels = {"viridis": f"${symbol}$", "magma": f"range of ${symbol}$ in a period"}
     images = [frame.images[0] for frame in axes.flat if frame.images]
     kinds = {image.get_cmap().name: image for image in images}

@@ -43,14 +43,14 @@ class Spectrum:
     def has_parabola(self) -> bool:
         """Whether a parabola is put through the peak: not at the edges of the spectrum.
 
-        Bin 1 has the mean, which was taken away, for its lower neighbour.
+        The lower neighbour of bin 1 is the mean, which was subtracted.
         """
         return 1 < self.peak < len(np.asarray(self.frequency)) - 1
 
 
 @style.styled
 def spectrum(data: Spectrum, title: str = "") -> Figure:
-    """Draw (a) signal and fit, (b) spectrum and parabola, (c) both maxima from near."""
+    """Draw (a) signal and fit, (b) spectrum and parabola, (c) both maxima enlarged."""
     figure, axes = style.new_panels(3, style.PAGE + 0.4, 2.5)
     axes[0].plot(data.t, data.y, color=style.BLUE, label="signal")
     if data.fit is not None:

@@ -1,7 +1,7 @@
 """Colours, markers, sizes and file writing shared by all figures.
 
-Classes differ by shape as well as by colour, and the colours by lightness as well as by hue, so
-that figures survive colour blindness and grey printing.
+Classes differ in shape and in colour, and the colours differ in lightness and in hue. The figures
+can therefore be read by colour-blind people and in greyscale prints.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ SETTINGS: Any = {
 
 _MOST_NAMES = 12
 _TRIES = 4
-"""Times that ticks are thinned out."""
+"""Largest number of times that ticks are thinned out."""
 
 Arguments = ParamSpec("Arguments")
 Made = TypeVar("Made")
@@ -106,7 +106,7 @@ def scatter_class(
 
 
 def draw_shares(axes: Axes, x: ArrayLike, y: ArrayLike, shares: ArrayLike) -> QuadMesh:
-    """Draw shares (n_x, n_y) from 0 to 1 over x (n_x,) and y (n_y,), cells without one white.
+    """Draw shares (n_x, n_y) from 0 to 1 over x (n_x,) and y (n_y,); white if missing.
 
     x and y are centres of cells and need not be equally spaced.
     """
@@ -136,7 +136,7 @@ def name_nodes(axis: Axis, names: Sequence[str], **look: Any) -> None:
 
 
 def plain(text: str) -> str:
-    """Keep dollars of a text that is drawn from beginning a formula."""
+    """Escape the dollar signs of a text, so that they do not begin a formula."""
     return text.replace("$", r"\$")
 
 
@@ -158,9 +158,9 @@ def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
 
 
 def thin_ticks(figure: Figure) -> bool:
-    """Leave out every other tick of axes whose labels overlap; say whether there were any.
+    """Remove every other tick of axes whose labels overlap; return whether there were any.
 
-    The figure has been drawn before.
+    The figure must have been drawn before.
     """
     flat = [axes for axes in figure.axes if axes.name != "3d"]
     crowded = [axis for axes in flat for axis in (axes.xaxis, axes.yaxis) if _overlaps(axis)]
@@ -234,7 +234,7 @@ def spoken(name: str) -> str:
 
 
 def drawn(name: str) -> str:
-    """Return a class name as figures have it."""
+    """Return a class name as it is written in figures."""
     return plain(spoken(name))
 
 
