@@ -111,20 +111,3 @@ def run_names(labels: Integers, status: ArrayLike, names: Sequence[str]) -> list
     """Name the class of every run: its class, ``steady``, ``no_window``, or None without result."""
     every: list[str | None] = [*names, STEADY, NO_WINDOW, None]
     return [every[vote] for vote in vote_labels(labels, status, len(names))]
-
-
-def class_for_comparison(cell: Mapping[str, Any], cut: Cut) -> str | None:
-    """Return a cell's modal base class, with steady votes counted as ordered (as in the paper).
-
-    Votes of sub-classes are counted for their base class. Ties go to the class with more members.
-    """
-    family_of = dict(zip(cut.names, cut.families, strict=True)) | {STEADY: "ordered"}
-    votes: dict[str, int] = {}
-    for name, count in cell["votes"].items():
-        if name in family_of:
-            votes[family_of[name]] = votes.get(family_of[name], 0) + count
-    size = {family: 0 for family in votes}
-    for family, members in zip(cut.families, cut.sizes, strict=True):
-        if family in size:
-            size[family] += int(members)
-    return max(votes, key=lambda family: (votes[family], size[family]), default=None)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Cut
-from chimera_hpc.classify.modes import class_for_comparison, modal_classes, run_names
+from chimera_hpc.classify.modes import modal_classes, run_names
 
 NAMES = ("ordered", "chimera", "disordered")
 S, W, D, N, F = Status.STEADY, Status.NO_WINDOW, Status.DONE, Status.NEVER, Status.TIME_OUT
@@ -122,32 +122,3 @@ def test_modal_classes_equal_the_naive_twin(runs: list[Any]) -> None:
 def test_runs_are_named_by_class_or_outcome() -> None:
     names = run_names(np.array([0, 2, -1, -1, -1, -1]), [D, D, S, W, N, F], NAMES)
     assert names == ["ordered", "disordered", "steady", "no_window", None, None]
-
-
-def test_comparison_counts_steady_votes_as_ordered(table: Any) -> None:
-    labels, status = [-1, -1, 2, 2, 2, 0], [S, S, D, D, D, D]
-    cell = one_cell(table, labels, status)
-    assert cell["class"] == "disordered"
-    assert class_for_comparison(cell, cut_of(labels, sizes=[9, 1, 3])) == "ordered"
-    assert class_for_comparison(cell, cut_of(labels, sizes=[2, 1, 3])) == "disordered"
-
-
-def test_comparison_joins_sub_classes(table: Any) -> None:
-    names = ("ordered", "chimera", "disordered-1", "disordered-2")
-    labels = [0, 0, 0, 2, 2, 3, 3]
-    cell = one_cell(table, labels, [D] * 7, names=names)
-    assert cell["class"] == "ordered"
-    assert class_for_comparison(cell, cut_of(labels, names=names)) == "disordered"
-
-
-def test_comparison_settles_ties_by_the_members_of_whole_classes(table: Any) -> None:
-    names = ("ordered", "chimera", "disordered-1", "disordered-2")
-    labels = [0, 0, 2, 3]
-    cell = one_cell(table, labels, [D] * 4, names=names)
-    for sizes, expected in (([7, 0, 4, 4], "disordered"), ([9, 0, 4, 4], "ordered")):
-        assert class_for_comparison(cell, cut_of(labels, names=names, sizes=sizes)) == expected
-
-
-def test_comparison_of_a_cell_without_result_is_none(table: Any) -> None:
-    cell = one_cell(table, [-1], [N])
-    assert class_for_comparison(cell, cut_of([-1])) is None

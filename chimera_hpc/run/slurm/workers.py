@@ -260,6 +260,7 @@ def _classes() -> tuple[Any, Any]:
     before = signal.getsignal(signal.SIGINT)
     try:
         from dask_jobqueue.slurm import SLURMCluster, SLURMJob
+        from distributed.deploy.spec import ProcessInterface
     except ImportError:
         raise BadInput(_EXTRA) from None
     finally:
@@ -270,12 +271,14 @@ def _classes() -> tuple[Any, Any]:
 
         refused: str | None = None
 
-        async def _submit_job(self, script_filename: str) -> str:
-            try:
-                return await asyncio.to_thread(queue.submit, Path(script_filename))
-            except BadInput as error:
-                self.refused = str(error)
-                return "0"
+        async def start(self) -> None:
+            with self.job_file() as script:
+                try:
+                    self.job_id = await asyncio.to_thread(queue.submit, Path(script))
+                except BadInput as error:
+                    self.refused, self.job_id = str(error), "0"
+            # Its own start would submit the script once more.
+            await ProcessInterface.start(self)
 
         async def close(self) -> None:
             if self.job_id and not self.refused:

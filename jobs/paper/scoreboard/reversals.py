@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 
 JOBS = {"robustness-1": "diagonal", "robustness-2": "orientation2"}
 """The two jobs and the sweeps whose classes judge them."""
+N_LINKS = 650
+"""Links of the ring of 50 nodes with P = 13."""
 N_BINS = 12
 
 
@@ -104,7 +106,7 @@ def main(arguments: Sequence[str]) -> int:
         entry = evidence.value(job, "curves/robustness")
         curve = entry["by"][entry["judge"]]
         draws = (15, 40, 75, 150, 325)
-        again = with_replacement(np.array(curve["x"]), np.array(curve["fraction"]), 650, draws)
+        again = with_replacement(np.array(curve["x"]), np.array(curve["fraction"]), N_LINKS, draws)
         words = ", ".join(f"{w:.2f} at {m}" for m, w in zip(draws, again, strict=True))
         print(f"{job}: W with replacement {words}")
         print(f"{job}: |s|^2 from {each.norm.min():.0f} to {each.norm.max():.0f}")
