@@ -1,9 +1,13 @@
 """Sparse matrices (CSR) among the integers that all lanes of a kernel call share.
 
 A matrix is stored once for all lanes, as int64: where each row starts, the column of each entry,
-and the bits of each value, which is a float64. In a complete graph, or between two populations,
-many rows are equal off the diagonal. Such rows are stored once, ``M = Z T + diag(d)``, where Z
-picks the row of T of each row of M: L_0 u of a complete graph is ``N u - sum(u)``.
+and the bits of each value, which is a float64. Two kinds of matrices need less:
+
+- Equal values in each row off the diagonal, as for all networks without weights: a factor for each
+  row and the diagonal, ``M = diag(r) (0 or 1) + diag(d)``, so that a row is a plain sum.
+- Rows that are equal off the diagonal, as in a complete graph or between two populations: each is
+  stored once, ``M = Z T + diag(d)``, where Z picks the row of T of each row of M. L_0 u of a
+  complete graph is ``N u - sum(u)``.
 """
 
 from __future__ import annotations
@@ -68,7 +72,7 @@ def packed(network: Network, which: Which, k: int = 0) -> Packed:
     if which == "dirac":
         dirac = network.dirac(k)
         lower = network.boundary(k).shape[0] if k > 0 else 0
-        return pack(dirac, csr_array(dirac.T), share=False, numbers=(lower,))
+        return pack(dirac, csr_array(dirac.T), share=False, split=lower)
     if which == "laplacian":
         return pack(network.laplacian(k))
     if which == "adjacency":
@@ -79,27 +83,55 @@ def packed(network: Network, which: Which, k: int = 0) -> Packed:
     return pack(csr_array(network.adjacency - diags_array(degree)))
 
 
-def pack(*matrices: csr_array, share: bool = True, numbers: tuple[int, ...] = ()) -> Packed:
-    """Return matrices as integers: a header of six for each, ``numbers``, then the parts.
+def pack(*matrices: csr_array, share: bool = True, split: int = 0) -> Packed:
+    """Return matrices as integers: a header of seven for each, ``split``, then the parts.
 
-    The header is: rows of M, rows of T (0: none shared), offsets of starts, columns, values, and
-    of the rows' labels, which the diagonal follows. Entries of a row are in the order of columns.
+    The header is: rows of M, rows of T (0: none shared), and the offsets of the order in which rows
+    are stored, their starts, columns, values (0: equal in each row), and of what belongs to each
+    row: the label of a shared one, or the factor of equal values, then the diagonal. Rows are in
+    order of their lengths, so that processors predict the ends of the sums; entries of a row are in
+    the order of columns. Rows before ``split`` stay before the others.
     """
-    found = [_split(matrix, share) for matrix in matrices]
+    found = [_parts(matrix, share, split) for matrix in matrices]
     header: list[int] = []
-    parts: list[Integers] = []
-    at = 6 * len(found) + len(numbers)
-    for labels, table, diagonal in found:
-        block = [_ints(table.indptr), _ints(table.indices), _bits(table.data)]
-        block += [_ints(labels), _bits(diagonal)]
-        offsets = at + np.cumsum([0, *map(len, block)])
-        shared = table.shape[0] if len(labels) else 0
-        header += [len(labels) or table.shape[0], shared, *offsets[:4].tolist()]
-        parts += block
+    at = 7 * len(found) + 1
+    for rows, shared, parts in found:
+        offsets = at + np.cumsum([0, *map(len, parts)])
+        values = int(offsets[3]) if len(parts[3]) else 0
+        header += [rows, shared, *offsets[:3].tolist(), values, int(offsets[4])]
         at = int(offsets[-1])
-    integers = np.concatenate([np.array([*header, *numbers], dtype=np.int64), *parts])
+    blocks = [part for _, _, parts in found for part in parts]
+    integers = np.concatenate([np.array([*header, split], dtype=np.int64), *blocks])
     key = hashlib.blake2b(integers.tobytes(), digest_size=16).digest()
-    return Packed(integers, key, header[1], sum(table.nnz for _, table, _ in found))
+    return Packed(integers, key, header[1], sum(len(parts[2]) for _, _, parts in found))
+
+
+Parts: TypeAlias = tuple[int, int, list[Integers]]
+"""Rows of M, rows of T, and the blocks: order, starts, columns, values, labels or factors and
+diagonal."""
+
+
+def _parts(matrix: csr_array, share: bool, split: int) -> Parts:
+    ordered = matrix.copy()
+    ordered.sum_duplicates()
+    n = ordered.shape[0]
+    if share and (found := _shared_rows(ordered)):
+        labels, table, diagonal = found
+        each = [_bits(table.data), _ints(labels), _bits(diagonal)]
+        return (
+            n,
+            table.shape[0],
+            [_ints(np.arange(n)), _ints(table.indptr), _ints(table.indices), *each],
+        )
+    order = np.lexsort((np.diff(ordered.indptr), np.arange(n) >= split))
+    if share and (uniform := _uniform_rows(ordered)):
+        factors, table, diagonal = uniform
+        sorted_rows = table[order]
+        each = [_ints(np.empty(0)), _bits(factors[order]), _bits(diagonal[order])]
+    else:
+        sorted_rows = ordered[order]
+        each = [_bits(sorted_rows.data)]
+    return n, 0, [_ints(order), _ints(sorted_rows.indptr), _ints(sorted_rows.indices), *each]
 
 
 def _ints(values: NDArray[np.integer]) -> Integers:
@@ -110,23 +142,36 @@ def _bits(values: Array) -> Integers:
     return np.ascontiguousarray(values, dtype=np.float64).view(np.int64)
 
 
-def _split(matrix: csr_array, share: bool) -> tuple[Integers, csr_array, Array]:
-    """Return (labels, T, d) with M = T[labels] + diag(d); without labels, M is T."""
-    ordered = matrix.copy()
-    ordered.sum_duplicates()
-    found = _shared_rows(ordered) if share else None
-    return found or (np.empty(0, dtype=np.int64), ordered, np.empty(0))
+def _uniform_rows(matrix: csr_array) -> tuple[Array, csr_array, Array] | None:
+    """Return (r, T, d) with M = diag(r) T + diag(d), T without diagonal and of ones; or None."""
+    if matrix.shape[1] != matrix.shape[0]:
+        return None
+    off, diagonal = _without_diagonal(matrix)
+    if not off.nnz:
+        return None
+    row = np.repeat(np.arange(off.shape[0]), np.diff(off.indptr))
+    factors = np.zeros(off.shape[0])
+    factors[row] = off.data
+    return (factors, off, diagonal) if np.array_equal(factors[row], off.data) else None
+
+
+def _without_diagonal(matrix: csr_array) -> tuple[csr_array, Array]:
+    from scipy.sparse import csr_array, diags_array
+
+    diagonal: Array = matrix.diagonal()
+    off = csr_array(matrix - diags_array(diagonal))
+    off.eliminate_zeros()
+    return off, diagonal
 
 
 def _shared_rows(matrix: csr_array) -> tuple[Integers, csr_array, Array] | None:
-    from scipy.sparse import csr_array, diags_array
+    """Return (labels, T, d) with M = T[labels] + diag(d) and few rows of T, or None."""
+    from scipy.sparse import csr_array
 
     n = matrix.shape[0]
-    diagonal: Array = matrix.diagonal()
     if matrix.shape[1] != n or matrix.nnz < DENSE * n * n:
         return None
-    off = csr_array(matrix - diags_array(diagonal))
-    off.eliminate_zeros()
+    off, diagonal = _without_diagonal(matrix)
     values = np.unique(off.data)
     if len(values) > MOST_VALUES:
         return None

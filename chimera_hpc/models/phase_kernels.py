@@ -14,7 +14,13 @@ from chimera_hpc.integrate.simd import (
     store_some,
 )
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
-from chimera_hpc.models.csr_kernels import matrix_at, multiply_shared_twice, product, products
+from chimera_hpc.models.csr_kernels import (
+    matrix_at,
+    multiply_shared_twice,
+    product,
+    products,
+    row_at,
+)
 from chimera_hpc.models.trigonometry import sin_cos
 
 # Sines and cosines are kept in rows of the lanes' parameters, as work space.
@@ -46,11 +52,12 @@ def _sakaguchi(zero, dy, params, ints):
     n = matrix.rows
     same, cross = load(zero, params, 0), load(zero, params, 1)
     sines, cosines = 2 + n, 2 + 2 * n
-    rows, work = (sines, cosines), (params, 2 + 3 * n)
-    multiply_shared_twice(zero, matrix, params, rows, work)
-    for i in range(n):
+    rows, work = (sines, cosines), (zero, params, 2 + 3 * n)
+    multiply_shared_twice(matrix, params, rows, work)
+    for k in range(n):
+        i = row_at(matrix, k)
         s, c = load(zero, params, sines + i), load(zero, params, cosines + i)
-        sum_s, sum_c = products(matrix, i, params, rows, (zero, zero), work)
+        sum_s, sum_c = products(matrix, k, params, rows, (zero, zero), work)
         ahead = fma(sum_s, c, sum_c * s * -1.0)
         along = fma(sum_s, s, sum_c * c)
         total = fma(same, ahead, load(zero, params, 2 + i))
@@ -82,8 +89,9 @@ def _forces(zero, y, params, at, adjoint, places, sums):
     # Sines of the projections D^T theta of one part, and the sums of their cosines and sines.
     first, end = places
     total_c, total_s = zero, zero
-    for j in range(first, end):
-        sine, cosine = sin_cos(product(adjoint, j, y, 0, zero, (params, 0)))
+    for k in range(first, end):
+        j = row_at(adjoint, k)
+        sine, cosine = sin_cos(product(adjoint, k, y, 0, zero, (zero, params, 0)))
         store(params, at + j, sine)
         total_c, total_s = total_c + cosine, total_s + sine
     store(params, sums, total_c)
@@ -102,7 +110,7 @@ def _scale(zero, params, places, at, strength):
 @jit()
 def _simplicial(zero, y, dy, params, ints, explosive):
     dirac, adjoint = matrix_at(ints, 0), matrix_at(ints, 1)
-    n, lower = dirac.rows, ints[12]
+    n, lower = dirac.rows, ints[14]
     sums, at = 1 + n, 5 + n
     down, up = (0, lower), (lower, adjoint.rows)
     _forces(zero, y, params, at, adjoint, down, sums)
@@ -113,8 +121,9 @@ def _simplicial(zero, y, dy, params, ints, explosive):
         _scale(zero, params, down, at, sums + 2)
         _scale(zero, params, up, at, sums)
     strength = load(zero, params, 0)
-    for i in range(n):
-        pull = product(dirac, i, params, at, zero, (params, 0))
+    for k in range(n):
+        i = row_at(dirac, k)
+        pull = product(dirac, k, params, at, zero, (zero, params, 0))
         store(dy, i, fma(strength * -1.0, pull, load(zero, params, 1 + i)))
 
 

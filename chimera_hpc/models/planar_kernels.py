@@ -5,7 +5,7 @@ from functools import cache
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.simd import LANES, broadcast, fma, load, store
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
-from chimera_hpc.models.csr_kernels import matrix_at, multiply_shared_twice, products
+from chimera_hpc.models.csr_kernels import matrix_at, multiply_shared_twice, products, row_at
 
 THIRD = 1.0 / 3.0
 
@@ -16,11 +16,12 @@ def _fhn(zero, state, slopes, params, ints):
     n = matrix.rows
     rate, b = load(zero, params, 0), load(zero, params, 1)
     same, cross = load(zero, params, 2), load(zero, params, 3)
-    rows, work = (0, n), (params, 4)
-    multiply_shared_twice(zero, matrix, state, rows, work)
-    for i in range(n):
+    rows, work = (0, n), (zero, params, 4)
+    multiply_shared_twice(matrix, state, rows, work)
+    for k in range(n):
+        i = row_at(matrix, k)
         x, y = load(zero, state, i), load(zero, state, n + i)
-        pull_x, pull_y = products(matrix, i, state, rows, (zero, zero), work)
+        pull_x, pull_y = products(matrix, k, state, rows, (zero, zero), work)
         pull = fma(cross, pull_y, same * pull_x)
         store(slopes, i, fma(x, fma(x * x, -THIRD, 1.0), pull - y) * rate)
         store(slopes, n + i, fma(same, pull_y, fma(-1.0 * cross, pull_x, x + b)))
@@ -32,11 +33,12 @@ def _stuart_landau(zero, state, slopes, params, ints):
     n = matrix.rows
     growth, shear = load(zero, params, 0), load(zero, params, 1)
     same, cross = load(zero, params, 2), load(zero, params, 3)
-    rows, work = (0, n), (params, 4 + n)
-    multiply_shared_twice(zero, matrix, state, rows, work)
-    for i in range(n):
+    rows, work = (0, n), (zero, params, 4 + n)
+    multiply_shared_twice(matrix, state, rows, work)
+    for k in range(n):
+        i = row_at(matrix, k)
         x, y = load(zero, state, i), load(zero, state, n + i)
-        pull_x, pull_y = products(matrix, i, state, rows, (zero, zero), work)
+        pull_x, pull_y = products(matrix, k, state, rows, (zero, zero), work)
         square = fma(x, x, y * y)
         gain = growth - square
         turn = fma(-1.0 * shear, square, load(zero, params, 4 + i))

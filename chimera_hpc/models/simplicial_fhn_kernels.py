@@ -5,7 +5,7 @@ from functools import cache
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.simd import LANES, broadcast, fma, load, store
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
-from chimera_hpc.models.csr_kernels import matrix_at, multiply_shared, product
+from chimera_hpc.models.csr_kernels import matrix_at, multiply_shared, product, row_at
 from chimera_hpc.models.topological_fhn_kernels import activator
 
 
@@ -13,28 +13,31 @@ from chimera_hpc.models.topological_fhn_kernels import activator
 def _reduced(zero, y, dy, params, ints):
     laplacian = matrix_at(ints, 0)
     n = laplacian.rows
-    work = params, 2 + n
-    multiply_shared(zero, laplacian, y, 0, work)
+    work = zero, params, 2 + n
+    multiply_shared(laplacian, y, 0, work)
     rate, c = load(zero, params, 0), load(zero, params, 1)
-    for i in range(n):
+    for k in range(n):
+        i = row_at(laplacian, k)
         u, w = load(zero, y, i), load(zero, y, n + i)
         store(dy, i, activator(u, w, rate))
         local = fma(c, w, load(zero, params, 2 + i))
-        store(dy, n + i, product(laplacian, i, y, 0, local, work))
+        store(dy, n + i, product(laplacian, k, y, 0, local, work))
 
 
 @jit()
 def _full(zero, y, dy, params, ints):
     dirac, adjoint = matrix_at(ints, 0), matrix_at(ints, 1)
     n = dirac.rows
-    work = params, 0
+    work = zero, params, 0
     rate, b, c = load(zero, params, 0), load(zero, params, 1), load(zero, params, 2)
-    for i in range(n):
-        w = product(dirac, i, y, n, zero, work)
+    for k in range(n):
+        i = row_at(dirac, k)
+        w = product(dirac, k, y, n, zero, work)
         store(dy, i, activator(load(zero, y, i), w, rate))
-    for j in range(adjoint.rows):
+    for k in range(adjoint.rows):
+        j = row_at(adjoint, k)
         local = fma(c, load(zero, y, n + j), b)
-        store(dy, n + j, product(adjoint, j, y, 0, local, work))
+        store(dy, n + j, product(adjoint, k, y, 0, local, work))
 
 
 def reduced_rhs(y, dy, lane_params, int_params):

@@ -13,20 +13,21 @@ from chimera_hpc.models.csr import Packed, pack, packed
 def unpacked(found: Packed, number: int = 0) -> np.ndarray:
     """Read a matrix back, entry by entry."""
     ints = found.integers
-    rows, shared, start, column, value, label = ints[6 * number : 6 * number + 6].tolist()
+    reals = ints.view(np.float64)
+    rows, shared, order, start, column, value, each = ints[7 * number : 7 * number + 7].tolist()
     table = []
-    for i in range(shared or rows):
-        begin, end = ints[start + i : start + i + 2].tolist()
+    for k in range(shared or rows):
+        begin, end = ints[start + k : start + k + 2].tolist()
         columns = ints[column + begin : column + end]
         assert (np.diff(columns) > 0).all()
-        table.append((columns, ints[value + begin : value + end].view(np.float64)))
+        table.append((columns, reals[value + begin : value + end] if value else reals[each + k]))
     width = 1 + max(max(columns, default=0) for columns, _ in table)
-    matrix = np.zeros((rows, max(width, rows if shared else 0)))
-    for i in range(rows):
-        columns, values = table[ints[label + i] if shared else i]
+    matrix = np.zeros((rows, width if value and not shared else rows))
+    for k, i in enumerate(ints[order : order + rows]):
+        columns, values = table[ints[each + k] if shared else k]
         matrix[i, columns] = values
-        if shared:
-            matrix[i, i] += ints[label + rows + i : label + rows + i + 1].view(np.float64)[0]
+        if shared or not value:
+            matrix[i, i] += reals[each + rows + k]
     return matrix
 
 
@@ -47,6 +48,9 @@ BIPARTITE = np.kron([[0, 1], [1, 0]], np.ones((6, 6)))
         # One entry less, and nothing but equal rows would be wrong.
         (COMPLETE * (np.arange(144).reshape(12, 12) != 1), 2, 22),
         (np.arange(144.0).reshape(12, 12), 0, 143),
+        # Equal in each row but for the diagonal, which is not counted: a chain.
+        (2 * np.eye(12) - np.eye(12, k=1) - np.eye(12, k=-1), 0, 22),
+        (np.diag(np.arange(12.0)) + np.arange(12.0)[:, None] * np.eye(12, k=5), 0, 6),
     ],
 )
 def test_equal_rows_are_stored_once(matrix, n_shared, n_entries):
@@ -70,7 +74,7 @@ def test_matrices_of_a_network(k):
     found = packed(network, "dirac", k)
     np.testing.assert_array_equal(unpacked(found), dirac)
     np.testing.assert_array_equal(unpacked(found, 1), dirac.T)
-    assert found.integers[12] == (0, network.n_nodes, network.n_links)[k]
+    assert found.integers[14] == (0, network.n_nodes, network.n_links)[k]
     laplacian = unpacked(packed(network, "laplacian", k))
     np.testing.assert_array_equal(laplacian, network.laplacian(k).toarray())
     assert packed(network, "dirac", k) is found
