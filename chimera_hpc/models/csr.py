@@ -97,7 +97,8 @@ def pack(*matrices: csr_array, share: bool = True, split: int = 0) -> Packed:
     at = 7 * len(found) + 1
     for rows, shared, parts in found:
         offsets = at + np.cumsum([0, *map(len, parts)])
-        values = int(offsets[3]) if len(parts[3]) else 0
+        uniform = len(parts) > 4 and not len(parts[3])
+        values = 0 if uniform else int(offsets[3])
         header += [rows, shared, *offsets[:3].tolist(), values, int(offsets[4])]
         at = int(offsets[-1])
     blocks = [part for _, _, parts in found for part in parts]
