@@ -199,6 +199,49 @@ def order_parameter(u, w):
     return np.abs(np.exp(1j * phi).mean(axis=1)).mean()
 
 
+def neighbours_of(node, pairs):
+    """The other ends of a node's pairs."""
+    return sorted({b for a, b in pairs if a == node} | {a for a, b in pairs if b == node})
+
+
+def ring_pairs(n):
+    """Pairs of next nodes around a ring."""
+    return [(i, (i + 1) % n) for i in range(n)]
+
+
+def local_order(phase, pairs):
+    """|mean of exp(i phi)| over each node and its neighbours, time by time."""
+    groups = [[i, *neighbours_of(i, pairs)] for i in range(phase.shape[1])]
+    return np.array([[abs(np.mean(np.exp(1j * row[g]))) for g in groups] for row in phase])
+
+
+def g0(u, pairs, delta=0.01):
+    """Share of nodes whose |sum of differences to the neighbours| is below delta of the largest."""
+    nodes = range(u.shape[1])
+    curvature = np.array(
+        [[abs(sum(row[j] - row[i] for j in neighbours_of(i, pairs))) for i in nodes] for row in u]
+    )
+    return (curvature < delta * curvature.max()).mean(axis=1)
+
+
+def g0_global(u, delta=0.01):
+    """Root of the share of pairs of nodes that are closer than delta of the largest distance."""
+    pairs = list(itertools.combinations(range(u.shape[1]), 2))
+    distance = np.array([[abs(row[i] - row[j]) for i, j in pairs] for row in u])
+    return np.sqrt((distance < delta * distance.max()).mean(axis=1))
+
+
+def adaptive_coherence(u, threshold):
+    """chi^2 after each signal is moved to its first rise in the first half, and the delays."""
+    half, delays = len(u) // 2, []
+    for x in u.T:
+        rises = [k for k in range(half - 2) if x[k + 1] < threshold < x[k + 2]]
+        delays.append(rises[0] if rises else 0)
+    n = len(u) - max(delays)
+    moved = np.array([x[d : d + n] for x, d in zip(u.T, delays, strict=True)])
+    return np.var(moved.mean(axis=0)) / np.var(moved, axis=1).mean(), len(set(delays))
+
+
 # --- grid -----------------------------------------------------------------------------------------
 
 

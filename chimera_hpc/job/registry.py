@@ -42,8 +42,22 @@ MEASURES = {
     "distance": "chimera_hpc.measures.scalars:DISTANCE",
     "local_sigma": "chimera_hpc.measures.scalars:LOCAL_SIGMA",
     "paper-printed": "chimera_hpc.measures.scalars:PAPER_PRINTED",
+    "order": "chimera_hpc.measures.panel:ORDER",
+    "communities": "chimera_hpc.measures.panel:COMMUNITIES",
+    "g0h0": "chimera_hpc.measures.panel:CORRELATIONS",
+    "phase_velocity": "chimera_hpc.measures.panel:VELOCITY",
+    "centre_of_mass": "chimera_hpc.measures.panel:CENTRE_OF_MASS",
+    "acm": "chimera_hpc.measures.panel:ACM",
+    "fit": "chimera_hpc.measures.panel:FIT",
 }
 """Measures of a run: `measures.measure.Measure`."""
+
+OTHER_NAMES: dict[str, tuple[str, ...]] = {
+    "triplet": ("variations",),
+    "SI": ("range", "local_sigma"),
+    "sigma_l": ("sigma",),
+}
+"""Names from the literature that a job's panel may hold, and the measures behind them."""
 
 DEFAULT_PANEL = (
     "variations",

@@ -10,7 +10,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.models import built_in
 from chimera_hpc.job.parameters import DELTA, SEED
-from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES, MEASURES
+from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES, MEASURES, OTHER_NAMES
 from chimera_hpc.models.parameters import ModelParameters, Parameter
 
 _EXAMPLE = 'NAME=NUMBER is needed, such as "P=9 Q=9 seed=0"'
@@ -102,8 +102,15 @@ def check_analyses(value: Any) -> tuple[str, ...]:
 
 
 def check_measures(value: Any) -> tuple[str, ...]:
-    """Return a tuple of different known names of measures; BadInput for others."""
-    names = _known_names("measures.panel", "a measure", value, MEASURES)
+    """Return a tuple of different known names of measures; BadInput for others.
+
+    Names from the literature become those of the measures behind them. The variations, which make
+    the classes, are added in front of a list without them.
+    """
+    given = _known_names("measures.panel", "a measure", value, {**MEASURES, **OTHER_NAMES})
+    names = tuple(name for known in given for name in OTHER_NAMES.get(known, (known,)))
+    if names and "variations" not in names:
+        names = ("variations", *names)
     if len(set(names)) < len(names):
         raise BadInput(f"measures.panel: {short(list(names))} holds a name twice")
     if names[:1] != ("variations",):
@@ -117,7 +124,7 @@ def check_name(key: str, kind: str, name: str, known: Iterable[str]) -> None:
         raise BadInput(f"{key}: {short(name)} is not {kind}{nearest(name, list(known))}")
 
 
-def _known_names(key: str, kind: str, value: Any, known: Mapping[str, str]) -> tuple[str, ...]:
+def _known_names(key: str, kind: str, value: Any, known: Iterable[str]) -> tuple[str, ...]:
     """Return a tuple of names that a registry has."""
     names = _texts(value)
     if names is None:

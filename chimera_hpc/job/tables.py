@@ -16,7 +16,13 @@ from pydantic import (
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.job.registry import DEFAULT_PANEL, MEASURES, METHODS, REMOVED_METHODS
+from chimera_hpc.job.registry import (
+    DEFAULT_PANEL,
+    MEASURES,
+    METHODS,
+    OTHER_NAMES,
+    REMOVED_METHODS,
+)
 from chimera_hpc.job.selection import (
     check_analyses,
     check_figures,
@@ -199,7 +205,7 @@ class Measures(Table):
     panel: Annotated[tuple[str, ...], BeforeValidator(check_measures)] = Field(
         DEFAULT_PANEL,
         description="Measures, in the order of the store's scalars; variations come first.",
-        json_schema_extra={"items": {"enum": list(MEASURES), "type": "string"}},
+        json_schema_extra={"items": {"enum": [*MEASURES, *OTHER_NAMES], "type": "string"}},
     )
 
 

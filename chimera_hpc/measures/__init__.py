@@ -1,1 +1,77 @@
-"""Measures of oscillations: pure functions of times t (T,) and signals u (T, N)."""
+"""Measures of oscillations: pure functions of times t (T,) and signals u (T, N).
+
+The functions are loaded when they are first used, because most of them load kernels.
+"""
+
+from importlib import import_module
+
+TYPE_CHECKING = False
+
+if TYPE_CHECKING:
+    from chimera_hpc.measures.acm import adaptive_coherence
+    from chimera_hpc.measures.centres import centre_of_mass
+    from chimera_hpc.measures.coherence import chimera_index, metastability
+    from chimera_hpc.measures.correlations import g0, h0
+    from chimera_hpc.measures.fourier import fourier_features
+    from chimera_hpc.measures.incoherence import sigma
+    from chimera_hpc.measures.incoherence import strength_of_run as strength_of_incoherence
+    from chimera_hpc.measures.order_parameters import (
+        community_order,
+        local_order,
+        order_parameter,
+    )
+    from chimera_hpc.measures.phase_angles import phases
+    from chimera_hpc.measures.phase_velocity import mean_phase_velocity, plateau
+    from chimera_hpc.measures.variation import total_variations
+
+_HOMES = {
+    "adaptive_coherence": "acm",
+    "centre_of_mass": "centres",
+    "chimera_index": "coherence",
+    "community_order": "order_parameters",
+    "fourier_features": "fourier",
+    "g0": "correlations",
+    "h0": "correlations",
+    "local_order": "order_parameters",
+    "mean_phase_velocity": "phase_velocity",
+    "metastability": "coherence",
+    "order_parameter": "order_parameters",
+    "phases": "phase_angles",
+    "plateau": "phase_velocity",
+    "sigma": "incoherence",
+    "strength_of_incoherence": "incoherence",
+    "total_variations": "variation",
+}
+_OTHER_NAMES = {"strength_of_incoherence": "strength_of_run"}
+
+__all__ = [
+    "adaptive_coherence",
+    "centre_of_mass",
+    "chimera_index",
+    "community_order",
+    "fourier_features",
+    "g0",
+    "h0",
+    "local_order",
+    "mean_phase_velocity",
+    "metastability",
+    "order_parameter",
+    "phases",
+    "plateau",
+    "sigma",
+    "strength_of_incoherence",
+    "total_variations",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module(f"{__name__}.{_HOMES[name]}")
+    value: object = getattr(module, _OTHER_NAMES.get(name, name))
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -36,14 +36,15 @@ Test vector, computed by hand, for two times and four nodes:
 from __future__ import annotations
 
 import math
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
-from chimera_hpc.measures.checks import Array, floats, integer, node_rows
+from chimera_hpc.measures.checks import Array, choice, floats, integer, node_rows
+from chimera_hpc.measures.signals_input import checked_signals
 
 # Times per chunk, so that their sums stay in the first-level cache.
 _CHUNK = 1024
@@ -151,6 +152,38 @@ def discontinuity_measure(local: ArrayLike, delta: float | Array) -> float | Arr
     """
     s = _coherent(local, delta)
     return _plain(0.5 * np.abs(s - np.roll(s, -1, axis=-1)).sum(axis=-1))
+
+
+def strength_of_run(
+    t: ArrayLike,
+    u: ArrayLike,
+    groups: int = 6,
+    delta: float = 0.1256,
+    unit: Literal["range", "absolute"] = "range",
+) -> float:
+    """Strength of incoherence of a run, in [0, 1], as `chimera_hpc.measures` exports it.
+
+    Parameters
+    ----------
+    t : array_like, shape (T,)
+        Times, which do not matter as long as they are uniform.
+    u : array_like, shape (T, N)
+    groups : int
+        M.
+    delta : float
+        Threshold; the default is the paper's for its topological model.
+    unit : {"range", "absolute"}
+        Unit of delta: the range of u over times and nodes, or that of u.
+
+    Raises
+    ------
+    BadInput
+        As `local_sigma` and `strength_of_incoherence`, or another unit.
+    """
+    checked_signals(t, u)
+    choice("unit", unit, ("range", "absolute"))
+    scale = range_of(u) if unit == "range" else 1.0
+    return strength_of_incoherence(local_sigma(u, groups), delta * scale)
 
 
 def order_parameter(u: ArrayLike, w: ArrayLike) -> float:

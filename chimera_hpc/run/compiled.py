@@ -25,7 +25,7 @@ from chimera_hpc.store.provenance import cpu_model
 if TYPE_CHECKING:
     from chimera_hpc.job import Points, Sweep
 
-_DECIDING = ("model", "fixed", "integrator", "features", "keep")
+_DECIDING = ("model", "fixed", "integrator", "features", "measures", "keep")
 """Tables of a sweep that decide which kernels it needs, together with the names of its axes."""
 
 
