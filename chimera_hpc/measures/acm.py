@@ -19,12 +19,13 @@ Coherence(r_squared=1.0, n_delays=20)
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures.checks import Array, node_rows
 
 
@@ -67,10 +68,22 @@ def _delays(rows: Array, threshold: float) -> NDArray[np.int64]:
 
 def _synchrony(rows: Array, delays: NDArray[np.int64]) -> float:
     """Return chi^2 of the aligned rows."""
-    n = rows.shape[1] - int(delays.max())
-    total, variance = np.zeros(n), 0.0
-    for row, delay in zip(rows, delays, strict=True):
-        aligned = row[delay : delay + n]
-        total += aligned
-        variance += float(aligned.var())
+    total = np.zeros(rows.shape[1] - int(delays.max()))
+    variance: float = _align(rows, delays, rows.mean(axis=1), total)
     return float((total / len(rows)).var()) * len(rows) / variance if variance else float("nan")
+
+
+@jit()
+def _align(rows: Any, delays: Any, mean: Any, total: Any) -> float:
+    """Add the aligned rows, less their means, to total (n,); return the sum of their variances."""
+    n = total.size
+    variance = 0.0
+    for j in range(rows.shape[0]):
+        first = energy = 0.0
+        for i in range(n):
+            x = rows[j, delays[j] + i] - mean[j]
+            total[i] += x
+            first += x
+            energy += x * x
+        variance += energy / n - (first / n) * (first / n)
+    return variance

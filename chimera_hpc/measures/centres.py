@@ -38,7 +38,7 @@ def centre_of_mass(u: ArrayLike, w: ArrayLike | None = None) -> Array:
     parts = [node_rows("u", u)] + ([] if w is None else [node_rows("w", w)])
     if len({part.shape for part in parts}) > 1:
         raise BadInput(f"u and w must have one shape, not {[part.T.shape for part in parts]}")
-    distance = np.sqrt(sum(np.square(part.mean(axis=1)) for part in parts))
+    distance: Array = np.sqrt(sum(np.square(part.mean(axis=1)) for part in parts))
     if not np.isfinite(distance).all():
         raise BadInput("u and w must be finite")
     return distance

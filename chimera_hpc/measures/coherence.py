@@ -73,4 +73,5 @@ def _variance(order: Array, axis: int, ddof: int) -> Array:
     if not 0 <= integer("ddof", ddof) < count:
         what = ("times", "communities")[axis]
         raise BadInput(f"ddof = {ddof}: allowed is 0 to {count - 1} for {count} {what}")
-    return np.var(order, axis=axis, ddof=ddof)
+    variance: Array = np.var(order, axis=axis, ddof=ddof)
+    return variance

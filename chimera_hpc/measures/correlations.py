@@ -40,7 +40,7 @@ _CHUNK = 512
 
 
 def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = 0.01) -> Array:
-    """Spatial correlation g0(t), shape (T,).
+    """Spatial correlation of a run at each time, shape (T,).
 
     Parameters
     ----------
@@ -60,22 +60,24 @@ def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = 0.01) -> Ar
     parts = _parts(u)
     _check_delta(delta)
     n_nodes, n_times = parts.shape[1:]
-    found = np.zeros(n_times, dtype=np.int64)
+    found = np.zeros(n_times)
     if isinstance(pairs, str) and pairs == "global":
         n_pairs = n_nodes * (n_nodes - 1) // 2
         largest = _farthest(parts)
         if n_pairs == 0 or largest <= _noise(parts):
             return np.ones(n_times)
-        _count_pairs(parts, delta * largest, np.empty((2, _CHUNK)), found)
-        return np.sqrt(found / n_pairs)
+        _count_pairs(parts, delta * largest, np.empty((4, _CHUNK)), found)
+        correlation: Array = np.sqrt(found / n_pairs)
+        return correlation
     around = neighbours(pairs, n_nodes)
-    work = np.empty((2, _CHUNK))
+    work = np.empty((4, _CHUNK))
     largest = _curvature(parts, *around, math.inf, work, found)
     if largest <= _noise(parts):
         return np.ones(n_times)
     found[:] = 0
     _curvature(parts, *around, delta * largest, work, found)
-    return found / n_nodes
+    share: Array = found / n_nodes
+    return share
 
 
 def h0(u: ArrayLike, delta: float = 0.01, *, relative: bool = True) -> float:
@@ -115,8 +117,10 @@ def h0(u: ArrayLike, delta: float = 0.01, *, relative: bool = True) -> float:
 def _parts(u: ArrayLike) -> Array:
     """Return real and imaginary part of u (T, N), or u alone if it is real, as (1 or 2, N, T)."""
     values = np.asarray(u)
-    both = (values.real, values.imag) if values.dtype.kind == "c" else (u,)
-    parts = np.stack([node_rows("u", part) for part in both])
+    if values.dtype.kind == "c":
+        parts = np.stack([node_rows("u", part) for part in (values.real, values.imag)])
+    else:
+        parts = node_rows("u", u)[None]
     if not np.isfinite(parts.min() + parts.max()):
         raise BadInput("u must be finite")
     return parts
@@ -135,48 +139,59 @@ def _farthest(parts: Array) -> float:
     """Return the largest distance of two nodes at one time."""
     if len(parts) == 1:
         return float((parts[0].max(axis=0) - parts[0].min(axis=0)).max())
-    nothing = np.zeros(parts.shape[2], dtype=np.int64)
-    return float(_count_pairs(parts, 0.0, np.empty((2, _CHUNK)), nothing))
+    nothing = np.zeros(parts.shape[2])
+    return float(_count_pairs(parts, 0.0, np.empty((4, _CHUNK)), nothing))
 
 
 def _correlations(parts: Array) -> NDArray[np.float64]:
     """Return the modulus of the correlation coefficients of all pairs, (N, N)."""
-    centred = parts - parts.mean(axis=2, keepdims=True)
-    z = centred[0] if len(parts) == 1 else centred[0] + 1j * centred[1]
-    length = np.sqrt(np.einsum("knt,knt->n", centred, centred))
-    still = length <= 1e-15 * np.abs(parts).max() * math.sqrt(parts.shape[2])
-    z /= np.where(still, 1.0, length)[:, None]
-    rho: NDArray[np.float64] = np.abs(z.conj() @ z.T) if len(parts) == 2 else np.abs(z @ z.T)
-    rho[still] = rho[:, still] = 0.0
-    rho[np.ix_(still, still)] = 1.0
-    return rho
+    n_nodes, n_times = parts.shape[1:]
+    mean = parts.mean(axis=2, keepdims=True)
+    product = np.zeros((n_nodes, n_nodes), dtype=np.float64 if len(parts) == 1 else np.complex128)
+    # In chunks of times: a centred copy of the whole run costs more than the products.
+    for start in range(0, n_times, _CHUNK):
+        centred = parts[:, :, start : start + _CHUNK] - mean
+        z = centred[0] if len(parts) == 1 else centred[0] + 1j * centred[1]
+        product += z @ z.conj().T
+    size: NDArray[np.float64] = np.abs(product)
+    length = np.sqrt(np.diag(size))
+    still = length <= 1e-15 * max(-parts.min(), parts.max()) * math.sqrt(n_times)
+    scale = np.where(still, 1.0, length)
+    size /= scale[:, None] * scale
+    size[still] = size[:, still] = 0.0
+    size[np.ix_(still, still)] = 1.0
+    return size
 
 
 @jit()
 def _curvature(parts: Any, indptr: Any, indices: Any, limit: float, work: Any, found: Any) -> float:
     """Add to found (T,) the number of nodes with a curvature < limit; return the largest."""
     n_parts, n_nodes, n_times = parts.shape
-    largest = 0.0
-    size = work[0]
-    here = work[1]
-    for start in range(0, n_times, here.size):
-        n = min(here.size, n_times - start)
+    size, here, count, most = work[0], work[1], work[2], work[3]
+    most[:] = 0.0
+    for start in range(0, n_times, size.size):
+        n = min(size.size, n_times - start)
+        count[:n] = 0.0
         for j in range(n_nodes):
             degree = indptr[j + 1] - indptr[j]
-            size[:n] = 0.0
             for p in range(n_parts):
+                x = parts[p, j, start : start + n]
                 for i in range(n):
-                    here[i] = -degree * parts[p, j, start + i]
+                    here[i] = -degree * x[i]
                 for k in range(indptr[j], indptr[j + 1]):
                     other = parts[p, indices[k], start : start + n]
                     for i in range(n):
                         here[i] += other[i]
+                if p == 0:
+                    for i in range(n):
+                        size[i] = abs(here[i])
+            if n_parts > 1:
                 for i in range(n):
-                    size[i] += here[i] * here[i] if n_parts > 1 else abs(here[i])
-            for i in range(n):
-                curvature = np.sqrt(size[i]) if n_parts > 1 else size[i]
-                largest = max(largest, curvature)
-                found[start + i] += curvature < limit
+                    size[i] = np.sqrt(size[i] * size[i] + here[i] * here[i])
+            _tally(size, limit, n, count, most)
+        for i in range(n):
+            found[start + i] += count[i]
+    largest: float = _largest(most)
     return largest
 
 
@@ -184,22 +199,41 @@ def _curvature(parts: Any, indptr: Any, indices: Any, limit: float, work: Any, f
 def _count_pairs(parts: Any, limit: float, work: Any, found: Any) -> float:
     """Add to found (T,) the number of pairs with a distance < limit; return the largest."""
     n_parts, n_nodes, n_times = parts.shape
-    largest = 0.0
-    chunk = work.shape[1]
-    for start in range(0, n_times, chunk):
-        n = min(chunk, n_times - start)
+    size, count, most = work[0], work[2], work[3]
+    most[:] = 0.0
+    for start in range(0, n_times, size.size):
+        n = min(size.size, n_times - start)
+        count[:n] = 0.0
         for j in range(n_nodes):
+            one = parts[0, j, start : start + n]
             for k in range(j):
+                other = parts[0, k, start : start + n]
                 if n_parts == 1:
-                    one = parts[0, j, start : start + n]
-                    other = parts[0, k, start : start + n]
                     for i in range(n):
-                        found[start + i] += abs(one[i] - other[i]) < limit
-                else:
-                    for i in range(n):
-                        dx = parts[0, j, start + i] - parts[0, k, start + i]
-                        dy = parts[1, j, start + i] - parts[1, k, start + i]
-                        distance = np.sqrt(dx * dx + dy * dy)
-                        largest = max(largest, distance)
-                        found[start + i] += distance < limit
+                        count[i] += 1.0 if abs(one[i] - other[i]) < limit else 0.0
+                    continue
+                for i in range(n):
+                    dx = one[i] - other[i]
+                    dy = parts[1, j, start + i] - parts[1, k, start + i]
+                    size[i] = np.sqrt(dx * dx + dy * dy)
+                _tally(size, limit, n, count, most)
+        for i in range(n):
+            found[start + i] += count[i]
+    largest: float = _largest(most)
     return largest
+
+
+@jit()
+def _tally(size: Any, limit: float, n: int, count: Any, most: Any) -> None:
+    """Count the first n sizes that are < limit, and keep the largest of each place."""
+    for i in range(n):
+        count[i] += 1.0 if size[i] < limit else 0.0
+        most[i] = size[i] if size[i] > most[i] else most[i]
+
+
+@jit()
+def _largest(values: Any) -> float:
+    most = 0.0
+    for value in values:
+        most = max(most, value)
+    return most

@@ -53,7 +53,8 @@ def order_parameter(phase: ArrayLike) -> Array:
     BadInput
         A wrong shape, or phases that are not real or not finite.
     """
-    return np.abs(_vectors(phase).mean(axis=1))
+    order: Array = np.abs(_vectors(phase).mean(axis=1))
+    return order
 
 
 def local_order(phase: ArrayLike, pairs: str | ArrayLike = "ring", *, itself: bool = True) -> Array:
@@ -106,8 +107,7 @@ def community_members(communities: ArrayLike, n_nodes: int) -> list[NDArray[np.i
     """Return the nodes of each community. Raises BadInput: not one label per node."""
     labels = np.asarray(communities)
     if labels.shape != (n_nodes,):
-        text = f"one label for each of {n_nodes} nodes, not {labels.shape}"
-        raise BadInput(f"communities must have shape ({n_nodes},), {text}")
+        raise BadInput(f"communities: one label for each of {n_nodes} nodes, not {labels.shape}")
     return [np.flatnonzero(labels == label) for label in np.unique(labels)]
 
 
@@ -117,7 +117,8 @@ def _vectors(phase: ArrayLike) -> NDArray[np.complex128]:
         raise BadInput(f"phase must have shape (times, nodes), not {angle.shape}")
     if not np.isfinite(angle).all():
         raise BadInput("phase must be finite")
-    return np.exp(1j * angle)
+    vectors: NDArray[np.complex128] = np.exp(1j * angle)
+    return vectors
 
 
 class RunOrders(NamedTuple):
@@ -134,8 +135,8 @@ class RunOrders(NamedTuple):
 def run_orders(u: ArrayLike, w: ArrayLike, around: Neighbours | None = None) -> RunOrders:
     """Order parameters of a run u, w (T, N), in one pass without a phase.
 
-    As `order_parameter` and `local_order` of `phase_angles.phases`, "geometric". Neighbours are those of
-    a ring by default.
+    As `order_parameter` and `local_order` of `phase_angles.phases`, "geometric". Neighbours are
+    those of a ring by default.
     """
     x, y = node_rows("u", u), node_rows("w", w)
     around = neighbours("ring", len(x)) if around is None else around
@@ -223,19 +224,28 @@ def _orders(orbits: Any, indptr: Any, indices: Any, work: Any, local: Any, sums:
         total[:2, :n] = 0.0
         for j in range(n_nodes):
             _add(vectors, j, n, total)
+        _lengths(total, n)
         for i in range(n):
-            square = total[0, i] * total[0, i] + total[1, i] * total[1, i]
-            sums[0] += np.sqrt(square) / n_nodes
-            sums[1] += square / (n_nodes * n_nodes)
+            sums[0] += total[2, i] / n_nodes
+            sums[1] += total[2, i] * total[2, i] / (n_nodes * n_nodes)
         for j in range(n_nodes):
-            total[:2, :n] = 0.0
-            _add(vectors, j, n, total)
+            for i in range(n):
+                total[0, i] = vectors[0, j, i]
+                total[1, i] = vectors[1, j, i]
             for k in range(indptr[j], indptr[j + 1]):
                 _add(vectors, indices[k], n, total)
+            _lengths(total, n)
             length = 0.0
             for i in range(n):
-                length += np.sqrt(total[0, i] * total[0, i] + total[1, i] * total[1, i])
+                length += total[2, i]
             local[j] += length / (1 + indptr[j + 1] - indptr[j])
+
+
+@jit()
+def _lengths(total: Any, n: int) -> None:
+    """Write the lengths of n vectors total[:2] into total[2]."""
+    for i in range(n):
+        total[2, i] = np.sqrt(total[0, i] * total[0, i] + total[1, i] * total[1, i])
 
 
 @jit()

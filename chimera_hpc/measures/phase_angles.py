@@ -2,8 +2,8 @@ r"""Phases of oscillators by three methods.
 
 - "geometric": the angle of (u, w) about each node's mean point, atan2(w - <w>, u - <u>). Exact for
   orbits that turn about their mean; needs two components.
-- "hilbert": the angle of the analytic signal of u - <u>. Needs a narrow band; the first and the last
-  periods are less accurate unless the record holds whole periods.
+- "hilbert": the angle of the analytic signal of u - <u>. Needs a narrow band; the first and the
+  last periods are less accurate unless the record holds whole periods.
 - "fourier": the phase of each node's Fourier line, 2 pi Omega_i t + theta_i, see `fourier`. One
   frequency for the whole record.
 
@@ -63,7 +63,8 @@ def _geometric(x: Array, w: ArrayLike | None) -> Array:
     dx, dy = (part - part.mean(axis=1, keepdims=True) for part in (x, y))
     if not np.isfinite(dy).all():
         raise BadInput("w must be finite")
-    return np.arctan2(dy, dx).T
+    angle: Array = np.arctan2(dy, dx)
+    return angle.T
 
 
 def _hilbert(x: Array) -> Array:
@@ -78,8 +79,14 @@ def _fourier(x: Array) -> Array:
     from chimera_hpc.measures.fourier import measure_signals, wrap
 
     time = np.arange(x.shape[1], dtype=np.float64)
-    options = {"refine": "sine-fit", "time_origin": "absolute", "steady_threshold": 0.0}
-    found = measure_signals(time, x.T, window_reference="own", **options)
+    found = measure_signals(
+        time,
+        x.T,
+        window_reference="own",
+        refine="sine-fit",
+        time_origin="absolute",
+        steady_threshold=0.0,
+    )
     if found.status is not Status.DONE:
         raise BadInput('method "fourier": a signal has fewer than 10 maxima')
     return wrap(2.0 * np.pi * found.frequency * time[:, None] + found.phase)

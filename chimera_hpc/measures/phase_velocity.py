@@ -55,7 +55,8 @@ def mean_phase_velocity(t: ArrayLike, phase: ArrayLike, *, count: bool = False) 
     turned = np.unwrap(angle, axis=1)[:, -1] - angle[:, 0]
     if count:
         turned = 2.0 * np.pi * np.trunc(turned / (2.0 * np.pi))
-    return turned / (times[-1] - times[0])
+    velocity: Array = turned / (times[-1] - times[0])
+    return velocity
 
 
 def plateau(velocity: ArrayLike, width: float = PLATEAU_WIDTH) -> float:
@@ -91,7 +92,8 @@ def run_velocity(t: Array, u: ArrayLike, w: ArrayLike) -> Array:
     _turns(x, y, x_mean, y_mean, turns)
     first = np.arctan2(y[:, 0] - y_mean, x[:, 0] - x_mean)
     last = np.arctan2(y[:, -1] - y_mean, x[:, -1] - x_mean)
-    return (2.0 * np.pi * turns + last - first) / float(t[-1] - t[0])
+    velocity: Array = (2.0 * np.pi * turns + last - first) / float(t[-1] - t[0])
+    return velocity
 
 
 @jit()
