@@ -128,7 +128,7 @@ def _parts(matrix: csr_array, share: bool, split: int) -> Parts:
     if share and (uniform := _uniform_rows(ordered)):
         factors, table, diagonal = uniform
         sorted_rows = table[order]
-        each = [_ints(np.empty(0)), _bits(factors[order]), _bits(diagonal[order])]
+        each = [np.empty(0, dtype=np.int64), _bits(factors[order]), _bits(diagonal[order])]
     else:
         sorted_rows = ordered[order]
         each = [_bits(sorted_rows.data)]
