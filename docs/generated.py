@@ -14,6 +14,7 @@ from chimera_hpc.cli import COMMANDS
 from chimera_hpc.cli.main import parser
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import built_in
+from chimera_hpc.job.networks import KINDS, kind_parameters
 from chimera_hpc.job.parameters import DELTA
 from chimera_hpc.job.schema import job_schema
 from chimera_hpc.job.shipped import job_file
@@ -53,6 +54,8 @@ def job_file_tables() -> str:
     for name, model in built_in().items():
         parts += [f"### {name}", _parameters((model.n_nodes, *model.parameters))]
         parts += [f"- {limit.text}" for limit in model.limits]
+    for kind in KINDS:
+        parts += [f'### network.kind = "{kind}"', _parameters(kind_parameters(kind))]
     parts.append(f"`{DELTA.name}` may be an axis of every model. {DELTA.text}")
     for name, entry in properties.items():
         if "$ref" in entry:

@@ -8,8 +8,12 @@ points that are added later change no existing one.
 
 Each integer of the key is written as an int64 (two little-endian 32-bit words), so different keys
 give different entropy. `numpy.random.SeedSequence` over these words seeds PCG64. Its spawn key
-separates the two sub-streams: 0 for the initial state and 1 for the topology. The key of the
-topology ends with the number of reversed links.
+separates the sub-streams: 0 for the initial state and 1 for the topology. The key of the topology
+ends with the number of reversed links.
+
+Points of a job with a table [network] have other streams. The network's depends on its kind, its
+parameters and network_seed (spawn key 2; 3 for the links reversed at random). The initial state's
+key is (STREAM_TAG, model, kind, nodes, links, triangles, network_seed, seed), with spawn key 4.
 
 Test vectors (first two raw 64-bit outputs):
 
@@ -21,6 +25,7 @@ Test vectors (first two raw 64-bit outputs):
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from hashlib import blake2b
 from operator import index
@@ -60,6 +65,45 @@ def topology_stream(
     `flips`. Raises as `initial_stream` does.
     """
     return _generator(1, model, n_nodes, orientation, P, Q, seed, flips)
+
+
+def network_stream(parameters: Mapping[str, str | int | float]) -> np.random.Generator:
+    """Return the generator that draws a random network.
+
+    parameters: kind, n_nodes, network_seed and what else decides the network, by name.
+    """
+    return _drawn_by(2, parameters)
+
+
+def orientation_stream(parameters: Mapping[str, str | int | float]) -> np.random.Generator:
+    """Return the generator that draws which links of a network are reversed.
+
+    parameters: as of `network_stream`, and flips.
+    """
+    return _drawn_by(3, parameters)
+
+
+def initial_stream_on_network(
+    model: str, kind: str, sizes: tuple[int, int, int], network_seed: int, seed: int
+) -> np.random.Generator:
+    """Return the generator of the initial state of a point on a network of [network].
+
+    sizes: numbers of nodes, links and triangles.
+    """
+    return _generator(4, model, _model_number(kind), *sizes, network_seed, seed)
+
+
+def _drawn_by(sub_stream: int, parameters: Mapping[str, str | int | float]) -> np.random.Generator:
+    """Return the generator of a key that is text: the parameters as JSON, sorted by name.
+
+    The words are STREAM_TAG, followed by the 32 bytes of the BLAKE2b digest of the text as eight
+    little-endian words.
+    """
+    text = json.dumps(dict(parameters), sort_keys=True, separators=(",", ":"))
+    digest = blake2b(text.encode(), digest_size=32).digest()
+    words = np.array([STREAM_TAG, *np.frombuffer(digest, dtype="<u4")], dtype=np.uint32)
+    sequence = np.random.SeedSequence(words, spawn_key=(sub_stream,))
+    return np.random.Generator(np.random.PCG64(sequence))
 
 
 def _generator(sub_stream: int, model: str, *numbers: int) -> np.random.Generator:

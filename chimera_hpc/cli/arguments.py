@@ -13,6 +13,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.renaming import warn
 from chimera_hpc.base.wording import short
 from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.models import try_networks
 from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.reading import apply_overrides
 from chimera_hpc.job.selection import parse_selection
@@ -218,6 +219,8 @@ def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> S
         points = sweep.points()
         for i in {0, len(points) - 1}:
             check_user_model(sweep, points.row(i))
+    elif sweep.network is not None and not job.is_dir():
+        try_networks(sweep)
     if sweep.reduction.show or sweep.reduction.replay:
         from chimera_hpc.reduction.selection import check_selections
 

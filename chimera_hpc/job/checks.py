@@ -11,6 +11,7 @@ import numpy as np
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.axes import Axis, Values, normal_form, parse_axis, references, resolve
+from chimera_hpc.job.networks import NETWORK_SEED
 from chimera_hpc.job.parameters import DELTA, SEED, SEED_COUNT
 from chimera_hpc.job.points import expand, refuse_huge
 from chimera_hpc.job.tables import Features, Integrator, unknown_key
@@ -33,6 +34,7 @@ class Grid(dict[str, Any]):
         """Parse every axis once; `seeds` defaults to 1. Raises BadInput for a wrong axis."""
         if "n_nodes" in raw:
             raise BadInput("grid.n_nodes: one for a whole sweep; set it in [fixed]")
+        raw = _with_realisations(raw)
         parsed = {
             name: _parse(name, value, axis_parameter(model, name))
             for name, value in raw.items()
@@ -44,6 +46,15 @@ class Grid(dict[str, Any]):
         grid["seeds"] = count if normal == normal_form(Values(range(count))) else normal
         grid.parsed = {**parsed, "seeds": seeds}
         return grid
+
+
+def _with_realisations(raw: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return [grid] with a count of networks written as a range: n means 0 to n - 1."""
+    name = NETWORK_SEED.name
+    if type(raw.get(name)) is not int:
+        return raw
+    count = int(_at(f"grid.{name}", SEED_COUNT.check, raw[name]))
+    return {**raw, name: [0] if count == 1 else f"0:{count - 1}"}
 
 
 def parsed(grid: Mapping[str, Any]) -> Mapping[str, Axis]:

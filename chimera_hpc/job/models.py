@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job import registry
+from chimera_hpc.job.networks import kind_parameters, on_network
 from chimera_hpc.job.user_models import Origin, prints_to_stderr, user_model, user_source
 from chimera_hpc.models.parameters import ModelParameters
-from chimera_hpc.models.protocol import Model, ModelKind
+from chimera_hpc.models.protocol import BuiltIn, Model, ModelKind
+from chimera_hpc.network.sweep_network import network_of, pairs_of
 
 if TYPE_CHECKING:
+    from chimera_hpc.job.network_table import NetworkTable
     from chimera_hpc.job.spec import Sweep
+
+MOST_TRIED = 100
+"""Most networks that are made before a sweep starts, to find those that do not do."""
 
 
 def model_kind(name: str, origin: Origin | None = None) -> ModelKind:
@@ -31,11 +39,30 @@ def model_kind(name: str, origin: Origin | None = None) -> ModelKind:
     return found
 
 
-def parameters_of(name: str, origin: Origin | None = None) -> ModelParameters:
-    """Return the table of parameters of a model. Raises BadInput as `model_kind` does."""
+def parameters_of(
+    name: str, origin: Origin | None = None, network: NetworkTable | None = None
+) -> ModelParameters:
+    """Return the parameters of a model and of its network. Raises BadInput as `model_kind` does.
+
+    Without `network`, those of a ring belong to the model's own table, or are added to it. Raises
+    BadInput for a network with a model that does not live on networks.
+    """
     if origin is not None and origin.table is not None:
         return origin.table
-    return model_kind(name, origin).parameters
+    kind = model_kind(name, origin)
+    if network is not None and not getattr(kind, "on_network", None):
+        raise BadInput(f"network: {short(name)} gets no network{_how(name)}")
+    return on_network(kind.parameters, network) if _general(kind, network) else kind.parameters
+
+
+def _how(name: str) -> str:
+    return "; OwnModel(..., network=True) does" if ":" in name else ""
+
+
+def _general(kind: ModelKind, network: NetworkTable | None) -> bool:
+    """Tell whether a point is built on a `Network`, and not on the model's own ring."""
+    own_ring = kind.parameters.find("P") is not None
+    return bool(getattr(kind, "on_network", None)) and (network is not None or not own_ring)
 
 
 def built_in() -> dict[str, ModelParameters]:
@@ -50,10 +77,37 @@ def build(sweep: Sweep, row: Mapping[str, int | float]) -> Model:
     """
     kind = model_kind(sweep.model, sweep.origin)
     if ":" not in sweep.model:
+        if isinstance(kind, BuiltIn) and _general(kind, sweep.network):
+            return kind.build_on(network_of(sweep, row), sweep, row)
         return kind.build(sweep, row)
+    network = network_of(sweep, row) if _general(kind, sweep.network) else None
     defaults = {p.name: p.default for p in kind.parameters.parameters if p.default is not None}
     with prints_to_stderr():
+        if network is not None:
+            on_it: Callable[..., Model] = kind.point  # type: ignore[attr-defined]  # an OwnModel
+            return on_it({**defaults, **row}, network.n_nodes, sweep.model, network)
         return kind.build(sweep, {**defaults, **row})
+
+
+def try_networks(sweep: Sweep) -> None:
+    """Build the model on the different networks of a sweep, `MOST_TRIED` of them at most.
+
+    Raises BadInput for a network that cannot be made, that the model refuses, or that has not the
+    pairs that variations need.
+    """
+    assert sweep.network is not None
+    points = sweep.points()
+    names = [p.name for p in kind_parameters(sweep.network.kind)]
+    table = np.stack([points.columns[name].astype(np.float64) for name in names])
+    _, first = np.unique(table, axis=1, return_index=True)
+    for i in np.sort(first)[:MOST_TRIED].tolist():
+        row = points.row(i)
+        try:
+            build(sweep, row)
+            pairs_of(sweep, row)
+        except BadInput as error:
+            place = ", ".join(f"{name} = {row[name]}" for name in names)
+            raise BadInput(f"network with {place}: {error}") from None
 
 
 def model_folder(sweep: Sweep) -> str | None:

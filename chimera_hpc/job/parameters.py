@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from chimera_hpc.job.models import built_in
+from chimera_hpc.job.networks import KINDS, kind_parameters
 from chimera_hpc.models.parameters import Parameter
 
 SEED = Parameter("seed", int, None, "Number of the random initial state.", low=0, high=2**63 - 1)
@@ -38,14 +39,19 @@ _LINSPACE = {
 }
 
 
+def _of_networks() -> list[Parameter]:
+    return [parameter for kind in KINDS for parameter in kind_parameters(kind)]
+
+
 def grid_schema() -> dict[str, Any]:
     """Return the JSON Schema of [grid] for all models together."""
-    parameters = [p for model in built_in().values() for p in model.parameters]
+    parameters = [*_of_networks(), *(p for m in built_in().values() for p in m.parameters)]
     seeds = Parameter("seeds", int, 1, "A count n, seeds 0..n-1, or a list of seeds.", low=0)
     return _schema([*parameters, DELTA, seeds], axis=True)
 
 
 def fixed_schema() -> dict[str, Any]:
     """Return the JSON Schema of [fixed] for all models together."""
-    parameters = [p for model in built_in().values() for p in (model.n_nodes, *model.parameters)]
+    of_models = [p for model in built_in().values() for p in (model.n_nodes, *model.parameters)]
+    parameters = [*_of_networks(), *of_models]
     return _schema(parameters, axis=False)

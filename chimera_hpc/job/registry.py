@@ -86,6 +86,9 @@ ANALYSES = {
 }
 """Functions of a `reduction.analyses.AnalysisInput` that return a dict for results.json."""
 
+RING_ANALYSES = ("networks", "stability", "basin", "robustness")
+"""Those that need the paper's ring, with its P, Q and orientation."""
+
 FIGURES = {
     "space_time": "chimera_hpc.plot.spacetime:space_time_figure",
     "indicators": "chimera_hpc.plot.indicators:indicators_figure",

@@ -11,6 +11,7 @@ import json
 from typing import Any
 
 from chimera_hpc.job.models import built_in
+from chimera_hpc.job.networks import KINDS, kind_parameters
 from chimera_hpc.job.parameters import DELTA
 from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES
 from chimera_hpc.job.spec import Sweep
@@ -39,6 +40,8 @@ def job_schema() -> dict[str, Any]:
         "anyOf": [known, _USER_MODEL],
         "description": properties["model"]["description"],
     }
+    network = properties["network"]
+    properties["network"] = {"$ref": network["anyOf"][0]["$ref"]}
     for table in ("grid", "fixed"):
         del properties[table]["additionalProperties"]
         properties[table].pop("default", None)
@@ -51,7 +54,11 @@ def job_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,
         "title": "Job file of chimera_hpc",
-        "allOf": [_only_for(name, model) for name, model in built_in().items()],
+        "allOf": [
+            rule
+            for name, model in built_in().items()
+            for rule in (_only_for(name, model), _only_for(name, _anywhere(model), "network"))
+        ],
     }
 
 
@@ -60,22 +67,31 @@ def schema_text() -> str:
     return json.dumps(job_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
-def _only_for(name: str, model: ModelParameters) -> dict[str, Any]:
-    """Return the rule that [grid] and [fixed] hold only parameters of this model."""
+def _anywhere(model: ModelParameters) -> ModelParameters:
+    """Return the parameters of a model on any kind of network."""
+    added = {p.name: p for kind in KINDS for p in kind_parameters(kind)}
+    own = tuple(p for p in model.parameters if p.name not in added)
+    return ModelParameters(model.n_nodes, (*added.values(), *own))
+
+
+def _only_for(name: str, model: ModelParameters, table: str = "") -> dict[str, Any]:
+    """Return the rule that [grid] and [fixed] hold only parameters of this model.
+
+    It is for jobs with this table, or for those without [network].
+    """
     parameters = [parameter.name for parameter in model.parameters]
-    numbers = (model.n_nodes, *model.parameters)
+    numbers = () if table else (model.n_nodes, *model.parameters)
     defaults = {p.name: {"default": p.default} for p in numbers if p.default is not None}
     allowed = {
         "grid": {"propertyNames": {"enum": [*parameters, DELTA.name, "seeds"]}},
         "fixed": {
             "propertyNames": {"enum": [model.n_nodes.name, *parameters]},
-            "properties": defaults,
+            **({"properties": defaults} if defaults else {}),
         },
     }
-    return {
-        "if": {"properties": {"model": {"const": name}}, "required": ["model"]},
-        "then": {"properties": allowed},
-    }
+    named = {"properties": {"model": {"const": name}}, "required": ["model"]}
+    there = {"required": [table]} if table else {"not": {"required": ["network"]}}
+    return {"if": {"allOf": [named, there]}, "then": {"properties": allowed}}
 
 
 def _name_figures_and_analyses(keys: dict[str, Any]) -> None:

@@ -10,7 +10,14 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.models import built_in
 from chimera_hpc.job.parameters import DELTA, SEED
-from chimera_hpc.job.registry import ANALYSES, CUT_FIGURES, FIGURES, MEASURES, OTHER_NAMES
+from chimera_hpc.job.registry import (
+    ANALYSES,
+    CUT_FIGURES,
+    FIGURES,
+    MEASURES,
+    OTHER_NAMES,
+    RING_ANALYSES,
+)
 from chimera_hpc.models.parameters import ModelParameters, Parameter
 
 _EXAMPLE = 'NAME=NUMBER is needed, such as "P=9 Q=9 seed=0"'
@@ -99,6 +106,15 @@ def check_figures(value: Any) -> Any:
 def check_analyses(value: Any) -> tuple[str, ...]:
     """Return a tuple of known names of analyses; BadInput for others."""
     return _known_names("reduction.analyses", "an analysis", value, ANALYSES)
+
+
+def check_network_choices(analyses: Iterable[str]) -> None:
+    """Raise BadInput for an analysis of the paper's ring in a job with another network."""
+    for name in analyses:
+        if name in RING_ANALYSES:
+            raise BadInput(
+                f"reduction.analyses: {name} is an analysis of the ring, without [network]"
+            )
 
 
 def check_measures(value: Any) -> tuple[str, ...]:

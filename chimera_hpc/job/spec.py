@@ -38,26 +38,28 @@ from chimera_hpc.job.checks import (
     parsed,
 )
 from chimera_hpc.job.models import parameters_of
+from chimera_hpc.job.network_table import NetworkTable
+from chimera_hpc.job.networks import check_sizes
 from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
 from chimera_hpc.job.points import DTYPES, Points, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
-from chimera_hpc.job.selection import check_names
+from chimera_hpc.job.selection import check_names, check_network_choices
+from chimera_hpc.job.table import Line, Table
 from chimera_hpc.job.tables import (
     Features,
     Integrator,
     Keep,
-    Line,
     Measures,
     Reduction,
     Run,
     Slurm,
-    Table,
 )
 from chimera_hpc.job.user_models import Origin
 from chimera_hpc.models.parameters import ModelParameters
 
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
 _OLD_NAMES = {new: old for old, new in renaming.FEATURES.items()}
+_KNOWN = {"model", "network"}
 _DIGESTED = ("model", "grid", "fixed", "integrator", "features")
 # Digests from before these keys existed must not change.
 _NEWER_FEATURES = {"max_windows": 0, "prominence": 0.0, "steady": "apart"}
@@ -77,6 +79,9 @@ class Sweep(Table):
     )
     title: Line | None = Field(None, description="Heading of figures and report.")
     model: str = Field(description="Name of the model.")
+    network: NetworkTable | None = Field(
+        None, validate_default=True, description="The network of oscillators."
+    )
     grid: dict[str, Any] = Field(
         default_factory=dict,
         validate_default=True,
@@ -155,7 +160,12 @@ class Sweep(Table):
     @property
     def parameters(self) -> ModelParameters:
         """The table of parameters of the model."""
-        return parameters_of(self.model, self._origin)
+        return parameters_of(self.model, self._origin, self.network)
+
+    @property
+    def pairs(self) -> str:
+        """Over which pairs of nodes variations are taken: "ring", "links" or "order"."""
+        return self.measures.pairs or ("ring" if self.network is None else "links")
 
     @property
     def n_nodes(self) -> int:
@@ -224,20 +234,35 @@ class Sweep(Table):
         parameters_of(model, info.context)
         return model
 
+    @field_validator("network")
+    @classmethod
+    def _check_network(
+        cls, network: NetworkTable | None, info: ValidationInfo
+    ) -> NetworkTable | None:
+        plain = network is None or network == NetworkTable()
+        if not plain and "model" in info.data:
+            parameters_of(info.data["model"], info.context, network)
+        return None if plain else network
+
     @field_validator("grid")
     @classmethod
     def _normalise_grid(cls, grid: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        if "model" not in info.data:
+        if not set(info.data) >= _KNOWN:
             return grid
-        return Grid.of(parameters_of(info.data["model"], info.context), grid)
+        return Grid.of(_parameters(info), grid)
 
     @field_validator("fixed", mode="before")
     @classmethod
     def _complete_fixed(cls, fixed: Any, info: ValidationInfo) -> Any:
-        if not _is_table(fixed) or not {"model", "grid"} <= set(info.data):
+        if not _is_table(fixed) or not _KNOWN | {"grid"} <= set(info.data):
             return fixed
-        model = parameters_of(info.data["model"], info.context)
-        return complete_fixed(model, fixed, info.data["grid"])
+        network = info.data["network"]
+        if network is not None and network.nodes not in (None, fixed.get("n_nodes", network.nodes)):
+            raise BadInput(
+                f"fixed.n_nodes: {short(fixed['n_nodes'])}, but {network.file} has "
+                f"{network.nodes} nodes"
+            )
+        return complete_fixed(_parameters(info), fixed, info.data["grid"])
 
     @field_validator("keep")
     @classmethod
@@ -254,10 +279,23 @@ class Sweep(Table):
         single = {name: Values((value,)) for name, value in self.fixed.items()}
         check_tables(self.integrator, self.features, model, {**single, **axes})
         check_nodes(self.features, self.n_nodes)
-        own = model if ":" in self.model else None
+        if self.network is not None:
+            check_sizes(self.network.kind, self.n_nodes, _values({**single, **axes}))
+            check_network_choices(self.reduction.analyses)
+        own = model if ":" in self.model or self.network is not None else None
         check_names("reduction.show", self.reduction.show, own)
         check_names("reduction.replay", self.reduction.replay, own)
         return self
+
+
+def _parameters(info: ValidationInfo) -> ModelParameters:
+    """Return the table of parameters of the model and network that were validated before."""
+    return parameters_of(info.data["model"], info.context, info.data["network"])
+
+
+def _values(axes: Mapping[str, Axis]) -> dict[str, Any]:
+    """Return the values of the axes that do not depend on others."""
+    return {name: axis.values for name, axis in axes.items() if isinstance(axis, Values)}
 
 
 def spec_digest(spec: Mapping[str, Any]) -> str:
@@ -282,8 +320,10 @@ def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
     if "delta" in spec["grid"]:
         integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
         data["integrator"] = integrator
-    # Digests from before this table existed must not change.
-    default = Measures().model_dump(mode="json")
+    # Digests from before these tables existed must not change.
+    if "network" in spec:
+        data["network"] = {k: v for k, v in spec["network"].items() if k != "file"}
+    default = Measures().model_dump(mode="json", exclude_none=True)
     if spec.get("measures", default) != default:
         data["measures"] = spec["measures"]
     return {**data, "order of axes": list(spec["grid"])}

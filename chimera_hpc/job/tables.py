@@ -6,9 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StringConstraints,
     model_validator,
@@ -16,6 +14,7 @@ from pydantic import (
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.registry import (
     DEFAULT_PANEL,
     MEASURES,
@@ -29,6 +28,7 @@ from chimera_hpc.job.selection import (
     check_measures,
     check_selections,
 )
+from chimera_hpc.job.table import Line, Table
 from chimera_hpc.measures.conventions import PRESETS
 
 
@@ -68,8 +68,6 @@ def _known_method(value: str) -> str:
     return value
 
 
-Line = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=500)]
-"""Text on one line."""
 Word = Annotated[
     str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.,:@+-]*$", max_length=200)
 ]
@@ -77,18 +75,6 @@ Word = Annotated[
 Texts = tuple[str, ...]
 Lines = Annotated[tuple[Line, ...], BeforeValidator(_as_tuple)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
-
-
-class Table(BaseModel):
-    """Frozen; unknown keys, other types and NaN or infinity are errors."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        defer_build=True,  # building the validators is a fifth of the time of the import
-    )
 
 
 class Integrator(Table):
@@ -202,6 +188,12 @@ class Features(Table):
 class Measures(Table):
     """The measures of each run."""
 
+    pairs: Literal["ring", "links", "order"] | None = Field(
+        None,
+        description='Pairs of nodes over which variations are taken: "ring", a node and the next; '
+        '"links"; "order", consecutive nodes in the order of the network. Default: the ring\'s on '
+        "the ring, otherwise links.",
+    )
     panel: Annotated[tuple[str, ...], BeforeValidator(check_measures)] = Field(
         DEFAULT_PANEL,
         description="Measures, in the order of the store's scalars; variations come first.",
@@ -330,6 +322,7 @@ class Slurm(Table):
 
 
 TABLES: dict[str, type[Table]] = {
+    "network": NetworkTable,
     "integrator": Integrator,
     "features": Features,
     "measures": Measures,

@@ -27,6 +27,8 @@ class MeasuredRun(NamedTuple):
     """The job's table [features]: `job.tables.Features`."""
     distance: float
     """Distance of the last state from the centre of the ball of initial states, in its norm."""
+    pairs: NDArray[np.int64] | None = None
+    """(M, 2) pairs of nodes over which variations are taken; None: a node and the next."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from chimera_hpc.measures.measure import Measure, MeasuredRun
 def _variations(run: MeasuredRun) -> Sequence[float]:
     from chimera_hpc.measures.variation import total_variations
 
-    return total_variations(run.features)
+    return total_variations(run.features, pairs=run.pairs)
 
 
 def _paper_printed(run: MeasuredRun) -> Sequence[float]:
@@ -23,7 +23,7 @@ def _paper_printed(run: MeasuredRun) -> Sequence[float]:
 
     settings = {**run.settings.options(), **PRESETS["paper-printed"]}
     features = measure_signals(run.t, run.u, **settings)
-    return *total_variations(features), float(features.status)
+    return *total_variations(features, pairs=run.pairs), float(features.status)
 
 
 def _sigma(run: MeasuredRun) -> Sequence[float]:

@@ -1,4 +1,4 @@
-"""Total normalised variations of phase, amplitude and frequency along the ring."""
+"""Total normalised variations of phase, amplitude and frequency over pairs of nodes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ class HasProfiles(Protocol):
     def frequency(self) -> Array: ...
 
 
-def total_variations(features: HasProfiles, *, ring: bool = True) -> tuple[float, float, float]:
+def total_variations(
+    features: HasProfiles, *, ring: bool = True, pairs: ArrayLike | None = None
+) -> tuple[float, float, float]:
     """Total normalised variations (V_theta, V_a, V_Omega) of a run (paper, sec. III B).
 
     As `total_variation_arrays`, for an object with the attributes phase, amplitude and frequency.
@@ -32,13 +34,19 @@ def total_variations(features: HasProfiles, *, ring: bool = True) -> tuple[float
     made with steady = "level" have the levels of such a run in place of the amplitudes.
     """
     heights = getattr(features, "heights", features.amplitude)
-    return total_variation_arrays(features.phase, heights, features.frequency, ring=ring)
+    profiles = features.phase, heights, features.frequency
+    return total_variation_arrays(*profiles, ring=ring, pairs=pairs)
 
 
 def total_variation_arrays(
-    phase: ArrayLike, amplitude: ArrayLike, frequency: ArrayLike, *, ring: bool = True
+    phase: ArrayLike,
+    amplitude: ArrayLike,
+    frequency: ArrayLike,
+    *,
+    ring: bool = True,
+    pairs: ArrayLike | None = None,
 ) -> tuple[float, float, float]:
-    r"""Total normalised variations of three profiles along a ring of N nodes.
+    r"""Total normalised variations of three profiles along a ring of N nodes, or over pairs.
 
         V_theta = sum_i min(v_i, 2 pi - v_i) / (pi N) ,   v_i = |theta_{i+1} - theta_i| ,
         V_a     = sum_i |a_{i+1} - a_i| / N ,
@@ -46,7 +54,9 @@ def total_variation_arrays(
 
     where node N+1 is node 1 (paper, sec. III B). For V_theta, v_i is reduced modulo 2 pi,
     so phases may be outside [0, 2 pi). V_theta is in [0, 1], V_a has the unit of the signal, and
-    V_Omega that of the frequency.
+    V_Omega that of the frequency. With ``pairs``, the sums are over these pairs of nodes, such as
+    the links of a network, and are divided by their number; the order within a pair and the
+    numbering of the nodes do not matter.
 
     Parameters
     ----------
@@ -55,12 +65,14 @@ def total_variation_arrays(
     ring : bool
         If False, the nodes form a chain. The sum of N - 1 differences is then divided by N - 1, so
         V is still the mean over pairs of neighbours.
+    pairs : array_like of int, shape (M, 2), optional
+        Pairs of nodes, in place of neighbours along the ring. Without any pair, V is NaN.
 
     Raises
     ------
     BadInput
         Shapes that differ, or that are not (N,) with N >= 1; for a chain N >= 2; values that are
-        not real, or masked.
+        not real, or masked; pairs that name no nodes.
 
     Examples
     --------
@@ -79,8 +91,15 @@ def total_variation_arrays(
         )
     if not ring and profiles[0].size < 2:
         raise BadInput("a chain has at least two nodes")
-    pairs = slice(None) if ring else slice(-1)
-    v_phase, v_amplitude, v_frequency = (np.abs(np.roll(x, -1) - x)[pairs] for x in profiles)
+    if pairs is None:
+        places = slice(None) if ring else slice(-1)
+        differences = [np.abs(np.roll(x, -1) - x)[places] for x in profiles]
+    else:
+        first, second = _checked_pairs(pairs, profiles[0].size).T
+        if not len(first):
+            return (np.nan, np.nan, np.nan)
+        differences = [np.abs(x[second] - x[first]) for x in profiles]
+    v_phase, v_amplitude, v_frequency = differences
     v_phase %= 2.0 * np.pi
     v_phase = np.minimum(v_phase, 2.0 * np.pi - v_phase)
     return (
@@ -88,3 +107,14 @@ def total_variation_arrays(
         float(v_amplitude.mean()),
         float(v_frequency.mean()),
     )
+
+
+def _checked_pairs(pairs: ArrayLike, n_nodes: int) -> NDArray[np.int64]:
+    found = np.asarray(pairs)
+    if found.size == 0:
+        return np.empty((0, 2), dtype=np.int64)
+    if found.ndim != 2 or found.shape[1] != 2 or found.dtype.kind not in "iu":
+        raise BadInput(f"pairs must be whole numbers of shape (pairs, 2), not {found.shape}")
+    if found.min() < 0 or found.max() >= n_nodes:
+        raise BadInput(f"pairs name the nodes {found.min()} to {found.max()}: 0 to {n_nodes - 1}")
+    return found.astype(np.int64)

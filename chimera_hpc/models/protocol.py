@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.models.parameters import ModelParameters
+from chimera_hpc.network.network import Network
 
 Array: TypeAlias = NDArray[np.float64]
 Row: TypeAlias = Mapping[str, int | float]
@@ -56,11 +57,23 @@ class ModelKind(Protocol):
 
 @dataclass(frozen=True)
 class BuiltIn:
-    """A model of this package: its table of parameters, and the function that builds a point."""
+    """A model of this package: its table of parameters, and the functions that build a point.
+
+    ``on_network`` builds it on any network. The parameters of the network, and so of the ring that
+    is the default, are then added to the table, unless the model has a P of its own: ``builder``
+    then makes the points of a job without a table [network].
+    """
 
     parameters: ModelParameters
-    builder: Callable[[Any, Row], Model]
+    builder: Callable[[Any, Row], Model] | None = None
+    on_network: Callable[[Network, Any, Row], Model] | None = None
 
     def build(self, sweep: Any, row: Row) -> Model:
         """Return the model of one point, from its row of columns."""
+        assert self.builder is not None
         return self.builder(sweep, row)
+
+    def build_on(self, network: Network, sweep: Any, row: Row) -> Model:
+        """Return the model of one point on a network."""
+        assert self.on_network is not None
+        return self.on_network(network, sweep, row)

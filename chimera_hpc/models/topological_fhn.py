@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.base.streams import stream_key, topology_stream
 from chimera_hpc.models.parameters import (
     EPSILON,
     HALF_DEGREE,
@@ -23,6 +22,7 @@ from chimera_hpc.models.parameters import (
 from chimera_hpc.models.protocol import BuiltIn, Row
 from chimera_hpc.network.complex import dimension
 from chimera_hpc.network.network import Network
+from chimera_hpc.network.sweep_network import ring_of
 
 if TYPE_CHECKING:
     from chimera_hpc.models.csr import Packed
@@ -248,14 +248,13 @@ def _reach(network: Network) -> int:
 
 
 def _build(sweep: Any, row: Row) -> TopologicalFHN:
-    topology = Network.ring(sweep.n_nodes, int(row["P"]), int(row["orientation"]))
-    topology = topology.reorient_node(0, int(row["Q"]))
-    flips = int(row["flips"])
-    if flips:
-        stream = topology_stream(*stream_key(sweep.model, sweep.n_nodes, row), flips)
-        among = topology.links_at(0) if int(row["flip_set"]) == 1 else None
-        topology = topology.reorient_random(flips, stream, among)
-    return TopologicalFHN(topology, row["epsilon"], row["b"], row["c"], sweep.integrator.form)
+    return _on_network(ring_of(sweep, row), sweep, row)
+
+
+def _on_network(network: Network, sweep: Any, row: Row) -> TopologicalFHN:
+    signals: Any = getattr(sweep.network, "signals", "nodes")
+    form = sweep.integrator.form
+    return TopologicalFHN(network, row["epsilon"], row["b"], row["c"], form, signals)
 
 
 PARAMETERS = ModelParameters(
@@ -285,4 +284,4 @@ PARAMETERS = ModelParameters(
     forms=("reduced", "full"),
 )
 
-MODEL = BuiltIn(PARAMETERS, _build)
+MODEL = BuiltIn(PARAMETERS, _build, _on_network)

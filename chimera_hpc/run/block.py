@@ -25,6 +25,7 @@ from chimera_hpc.measures.measure import Measure, MeasuredRun
 from chimera_hpc.measures.quality import quality
 from chimera_hpc.measures.series import by_node, quantise, round_to
 from chimera_hpc.models.protocol import Model
+from chimera_hpc.network.sweep_network import pairs_of
 from chimera_hpc.run.initial_state import initial_state
 from chimera_hpc.run.watchdog import watchdog
 from chimera_hpc.store.block_result import BlockResult, empty_result
@@ -219,7 +220,8 @@ class _Block:
         self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
     ) -> Array:
         distance = self.distance(row, y_end)
-        run = MeasuredRun(self.times, u, w, features, self.sweep.features, distance)
+        pairs = pairs_of(self.sweep, self.rows[row])
+        run = MeasuredRun(self.times, u, w, features, self.sweep.features, distance, pairs)
         return _measure(self.panel, run)
 
     def distance(self, row: int, y_end: Array) -> float:

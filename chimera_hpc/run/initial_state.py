@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.base.streams import initial_stream, stream_key
+from chimera_hpc.base.streams import initial_stream, initial_stream_on_network, stream_key
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.user_models import prints_to_stderr
 from chimera_hpc.models.custom import OwnPoint
 from chimera_hpc.models.protocol import Model, Row
+from chimera_hpc.network.sweep_network import network_of
 
 Array = NDArray[np.float64]
 
@@ -25,12 +26,21 @@ def initial_state(sweep: Sweep, row: Row, model: Model, nudge: float = 0.0) -> t
 
     Returns u (N0,) and v (n_second,).
     """
-    stream = initial_stream(*stream_key(sweep.model, sweep.n_nodes, row))
+    stream = _stream(sweep, row)
     with prints_to_stderr():
         drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
     if drawn is None:
         drawn = _in_the_ball(sweep, row, model, stream)
     return (_moved(drawn[0], nudge, stream), _moved(drawn[1], nudge, stream)) if nudge else drawn
+
+
+def _stream(sweep: Sweep, row: Row) -> np.random.Generator:
+    if sweep.network is None:
+        return initial_stream(*stream_key(sweep.model, sweep.n_nodes, row))
+    network = network_of(sweep, row)
+    sizes = network.n_nodes, network.n_links, network.n_triangles
+    seeds = int(row.get("network_seed", 0)), int(row["seed"])
+    return initial_stream_on_network(sweep.model, sweep.network.kind, sizes, *seeds)
 
 
 def _moved(state: Array, nudge: float, stream: np.random.Generator) -> Array:

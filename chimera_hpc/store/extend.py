@@ -27,7 +27,7 @@ _EXPIRY = 20.0
 """Seconds after which a change by another machine counts as broken off; it takes one or two."""
 _PATIENCE = 30.0
 """Seconds to wait for others."""
-SAME_TABLES = ("model", "integrator", "features", "keep")
+SAME_TABLES = ("model", "network", "integrator", "features", "keep")
 """What the points of one store have in common."""
 
 

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from chimera_hpc import Network
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.measures.variation import total_variation_arrays, total_variations
@@ -56,6 +57,37 @@ profiles = hnp.arrays(float, (3, 7), elements=st.floats(-3.14, 3.14))
 @given(profiles)
 def test_equal_to_the_slow_twin(x):
     assert total_variation_arrays(*x) == pytest.approx(naive.total_variations(*x), abs=1e-14)
+
+
+@given(hnp.arrays(float, (3, 12), elements=st.floats(-9.0, 9.0)), st.integers(0, 20))
+def test_pairs_are_averaged_whatever_the_nodes_are_called(x, seed):
+    rng = np.random.default_rng(seed)
+    network = Network.random(12, 4.0, seed)
+    turns = [abs(naive.wrap(x[0, j] - x[0, i])) / np.pi for i, j in network.links]
+    steps = [np.abs(x[1:, j] - x[1:, i]) for i, j in network.links]
+    expected = np.mean(turns), *np.mean(steps, axis=0)
+    assert total_variation_arrays(*x, pairs=network.links) == pytest.approx(expected, abs=1e-12)
+    for _ in range(20):
+        new = rng.permutation(12)
+        again = rng.permutation(network.relabel(new).links)[:, :: rng.choice([-1, 1])]
+        found = total_variation_arrays(*x[:, np.argsort(new)], pairs=again)
+        assert found == pytest.approx(expected, abs=1e-12)
+
+
+@given(profiles, st.sampled_from([1, 2]))
+def test_links_of_a_ring_of_nearest_neighbours_give_its_variations_to_the_bit(x, orientation):
+    links = Network.ring(7, 1, orientation).links
+    assert total_variation_arrays(*x, pairs=links) == total_variation_arrays(*x)
+
+
+def test_without_pairs_there_is_no_variation():
+    assert np.isnan(total_variation_arrays(ZERO, ZERO, ZERO, pairs=[])).all()
+
+
+@pytest.mark.parametrize("pairs", [[[0, 4]], [[-1, 0]], [[0, 1, 2]], [[0.5, 1.0]], [0, 1]])
+def test_pairs_that_name_no_nodes_are_refused(pairs):
+    with pytest.raises(BadInput, match="pairs"):
+        total_variation_arrays(ZERO, ZERO, ZERO, pairs=pairs)
 
 
 @given(profiles, st.integers(0, 6), st.floats(-20, 20))

@@ -1,0 +1,77 @@
+"""The table [network] of a job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, StringConstraints, ValidationInfo, model_validator
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.networks import KINDS, RING
+from chimera_hpc.job.table import Line, Table
+from chimera_hpc.network.sweep_network import read_file
+
+
+def _known_kind(value: str) -> str:
+    if value not in KINDS:
+        raise BadInput(f"network.kind: {short(value)} is unknown{nearest(value, list(KINDS))}")
+    return value
+
+
+class NetworkTable(Table):
+    """The network of oscillators; without this table, the paper's ring."""
+
+    kind: Annotated[str, AfterValidator(_known_kind)] = Field(
+        RING,
+        description="Kind of network; its parameters are axes or fixed, like those of the model.",
+        json_schema_extra={"enum": list(KINDS)},
+    )
+    file: Line | None = Field(
+        None,
+        description='File of kind = "file", from the folder of the job: a list of edges, GraphML, '
+        "GML, JSON, or a matrix.",
+    )
+    triangles: Literal["none", "cliques"] = Field(
+        "none", description="Triangles of the network: none, or all triples of linked nodes."
+    )
+    digest: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{16}$")] | None = Field(
+        None, description="Digest of the file, which the plan fills in."
+    )
+    nodes: int | None = Field(
+        None, ge=1, description="Number of nodes in the file, which the plan fills in."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, given: Any, info: ValidationInfo) -> Any:
+        """Add path, digest and size of a file that a job names."""
+        name = given.get("file") if isinstance(given, dict) else None
+        if not isinstance(name, str) or given.get("kind") != "file" or given.get("digest"):
+            return given
+        folders = getattr(info.context, "folders", ())
+        places = [Path(folder, name) for folder in (*folders, "")]
+        path = next((place for place in places if place.is_file()), places[0]).absolute()
+        try:
+            network, digest = read_file(path)
+        except BadInput as error:
+            raise BadInput(f"network.file: {error}") from None
+        return {**given, "file": str(path), "digest": digest, "nodes": network.n_nodes}
+
+    @model_validator(mode="after")
+    def _check_file(self) -> Self:
+        if (self.kind == "file") != (self.file is not None):
+            raise BadInput('network.file: needed with kind = "file", and only with that')
+        return self
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """What of the table decides the numbers: all but where a file is."""
+        return self.model_dump(mode="json", exclude={"file"}, exclude_none=True)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, NetworkTable) and self.spec == other.spec
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.spec.items()))

@@ -1,0 +1,132 @@
+"""Kinds of networks that a job may name in [network], with their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.models.parameters import RING_LIMIT, Limit, ModelParameters, Parameter
+from chimera_hpc.models.topological_fhn import PARAMETERS as ON_THE_RING
+from chimera_hpc.network.sweep_network import RING, RING_PARAMETERS
+
+__all__ = ["KINDS", "NETWORK_SEED", "RING", "check_sizes", "kind_parameters", "on_network"]
+
+if TYPE_CHECKING:
+    from chimera_hpc.job.network_table import NetworkTable
+
+NETWORK_SEED = Parameter(
+    "network_seed",
+    int,
+    0,
+    "Number of the random network, or of its orientation; in [grid], a count n means 0..n-1.",
+    low=0,
+    high=2**63 - 1,
+)
+_FLIPS = Parameter("flips", int, 0, "Links reversed at random.", low=0, high=10**15)
+_P = Parameter("P", int, None, "Links of a node to each side, of the ring it is made of.", low=1)
+_SHARE = {"low": 0.0, "high": 1.0}
+
+KINDS: dict[str, tuple[Parameter, ...]] = {
+    RING: tuple(p for p in ON_THE_RING.parameters if p.name in RING_PARAMETERS),
+    "lattice": (
+        Parameter("columns", int, 1, "Nodes of a row; 1: one dimension.", low=1),
+        Parameter("periodic", int, 1, "Whether it closes: 1 yes, 0 no.", low=0, high=1),
+    ),
+    "small_world": (_P, Parameter("rewire", float, 0.1, "Share of links rewired.", **_SHARE)),
+    "scale_free": (Parameter("m", int, None, "Links of each new node.", low=1),),
+    "random": (Parameter("mean_degree", float, None, "Mean number of links of a node.", low=0.0),),
+    "modular": (
+        Parameter("modules", int, None, "Groups, as equal as can be.", low=1),
+        Parameter("p_in", float, None, "Probability of a link within a group.", **_SHARE),
+        Parameter("p_out", float, None, "Probability of a link across groups.", **_SHARE),
+    ),
+    "two_populations": (
+        Parameter("A", float, None, "Difference of the weights within and across.", -1.0, 1.0),
+    ),
+    "multiplex": (
+        Parameter("layers", int, 2, "Rings, one above the other.", low=1),
+        _P,
+        Parameter("layer_coupling", float, 1.0, "Weight of the links between layers."),
+    ),
+    "file": (),
+}
+"""Parameters of each kind, axes or fixed; `network_seed` and `flips` belong to all but the ring."""
+
+_LIMITS = {
+    "P": RING_LIMIT,
+    "m": Limit("m", (), lambda _, n: n - 1, "m must be smaller than n_nodes"),
+    "mean_degree": Limit(
+        "mean_degree", (), lambda _, n: n - 1, "a node has at most n_nodes - 1 links"
+    ),
+    "modules": Limit("modules", (), lambda _, n: n, "a group has at least one node"),
+}
+_DIVISORS = {"columns": "n_nodes / columns rows", "layers": "layers of equal size"}
+
+
+def kind_parameters(kind: str) -> tuple[Parameter, ...]:
+    """Return all parameters that a kind of network adds to a model."""
+    return KINDS[kind] if kind == RING else (*KINDS[kind], NETWORK_SEED, _FLIPS)
+
+
+def on_network(model: ModelParameters, table: NetworkTable | None) -> ModelParameters:
+    """Return the parameters of a model on a network of [network], or on a ring without it.
+
+    The network's parameters come first; those of the model's own ring are left out.
+    """
+    kind = RING if table is None else table.kind
+    added = kind_parameters(kind)
+    own = tuple(p for p in model.parameters if p.name not in RING_PARAMETERS)
+    names = {p.name for p in added}
+    if clash := names & {p.name for p in own}:
+        name = sorted(clash)[0]
+        raise BadInput(f'network.kind: "{kind}" and the model both have a parameter {name}')
+    n_nodes = model.n_nodes
+    if table is not None and table.nodes:
+        n_nodes = Parameter("n_nodes", int, table.nodes, n_nodes.text, table.nodes, table.nodes)
+    elif kind != RING:
+        n_nodes = Parameter("n_nodes", int, n_nodes.default, "Nodes of the network.", 1, 10**7)
+    return ModelParameters(
+        n_nodes=n_nodes,
+        parameters=(*added, *own),
+        limits=(*_limits(kind), *(x for x in model.limits if not _of_ring(x))),
+        forms=model.forms,
+    )
+
+
+def _limits(kind: str) -> tuple[Limit, ...]:
+    if kind == RING:
+        return ON_THE_RING.limits
+    if kind == "multiplex":
+        text = "2 P must be smaller than the nodes of a layer"
+        return (Limit("P", ("layers",), lambda x, n: (n // x["layers"] - 1) // 2, text),)
+    return tuple(_LIMITS[p.name] for p in KINDS[kind] if p.name in _LIMITS)
+
+
+def _of_ring(limit: Limit) -> bool:
+    return bool({limit.name, *limit.needs} & set(RING_PARAMETERS))
+
+
+def check_sizes(kind: str, n_nodes: int, values: Mapping[str, Any]) -> None:
+    """Raise BadInput unless the nodes can be shared out evenly where the kind needs that.
+
+    values: the values of each parameter.
+    """
+    if kind == "two_populations" and n_nodes % 2:
+        raise BadInput(f"fixed.n_nodes: {n_nodes} is odd; two populations have an even number")
+    for name, text in _DIVISORS.items():
+        if name not in {p.name for p in KINDS[kind]}:
+            continue
+        for value in values[name]:
+            if n_nodes % value:
+                raise BadInput(f"{name}: {value} does not divide n_nodes = {n_nodes}: {text}")
+            if name == "columns" and not _closes(n_nodes, value, values["periodic"]):
+                raise BadInput(
+                    f"columns: {value}, n_nodes = {n_nodes}: the sides of a periodic lattice are "
+                    "at least 3"
+                )
+
+
+def _closes(n_nodes: int, columns: int, periodic: Any) -> bool:
+    sides = [n_nodes // columns, *([columns] if columns > 1 else [])]
+    return 1 not in periodic or min(sides) >= 3

@@ -1,0 +1,22 @@
+"""What the tables of a job have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, StringConstraints
+
+Line = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=500)]
+"""Text on one line."""
+
+
+class Table(BaseModel):
+    """Frozen; unknown keys, other types and NaN or infinity are errors."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        defer_build=True,  # building the validators is a fifth of the time of the import
+    )
