@@ -17,6 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 import measure
+import networks
 import page
 import precision
 import single
@@ -31,6 +32,7 @@ PARTS = (
     "steps",
     "features",
     "networked",
+    "networks",
     "precision",
     "sweeps",
     "starting",
@@ -71,7 +73,7 @@ def main() -> int:
 
 
 def _part(part: str, sizes: Sizes, folder: Path, results: Results, tiny: bool) -> list[Row]:
-    if part in ("peers", "steps", "features", "networked", "precision"):
+    if part in ("peers", "steps", "features", "networked", "networks", "precision"):
         cores = os.sched_getaffinity(0)
         measure.stay_on_one_core()
         try:
@@ -101,6 +103,8 @@ def _single(part: str, sizes: Sizes, results: Results, tiny: bool) -> list[Row]:
         return single.features(sizes)
     if part == "networked":
         return single.networked(sizes)
+    if part == "networks":
+        return networks.against_peers(sizes)
     tolerances = (1e-3,) if tiny else (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
     results.precision = precision.curves(tolerances, 1 if tiny else 3, sizes.with_jax)
     return []
