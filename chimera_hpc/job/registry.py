@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 MODELS = {
     "topological_fhn": "chimera_hpc.models.topological_fhn:MODEL",
     "networked_fhn": "chimera_hpc.models.networked_fhn:MODEL",
+    "kuramoto_sakaguchi": "chimera_hpc.models.kuramoto_sakaguchi:MODEL",
+    "stuart_landau": "chimera_hpc.models.stuart_landau:MODEL",
+    "simplicial_kuramoto": "chimera_hpc.models.simplicial_kuramoto:MODEL",
 }
 """Objects with ``parameters`` and ``build``: `models.protocol.ModelKind`."""
 

@@ -1,20 +1,24 @@
-"""Natural frequencies of phase oscillators."""
+"""Natural frequencies of oscillators, given or drawn from a distribution."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.streams import network_stream
+from chimera_hpc.models.parameters import Parameter
+from chimera_hpc.models.protocol import Row
 
-KINDS = ("identical", "normal", "lorentzian")
+Kind: TypeAlias = Literal["identical", "normal", "lorentzian"]
+KINDS: tuple[Kind, ...] = ("identical", "normal", "lorentzian")
 
 
 def natural_frequencies(
     size: int,
-    kind: Literal["identical", "normal", "lorentzian"] = "identical",
+    kind: Kind = "identical",
     centre: float = 0.0,
     width: float = 1.0,
     seed: int | np.random.Generator = 0,
@@ -50,3 +54,21 @@ def natural_frequencies(
         return np.full(size, float(centre))
     drawn = random.standard_normal if kind == "normal" else random.standard_cauchy
     return centre + width * drawn(size)
+
+
+def frequency_parameters(centre: float) -> tuple[Parameter, ...]:
+    """Return what a job sets of the frequencies."""
+    return (
+        Parameter("omega", float, centre, "Centre of the natural frequencies (rad per time)."),
+        Parameter("width", float, 0.0, "Their standard deviation, or half width.", low=0.0),
+        Parameter(
+            "frequencies", int, 0, "0 identical, 1 normal, 2 Lorentzian, of each seed.", 0, 2
+        ),
+    )
+
+
+def frequencies_of(row: Row, model: str, size: int) -> NDArray[np.float64]:
+    """Return the natural frequencies of a point, from a stream of its model, size and seed."""
+    kind = KINDS[int(row["frequencies"])]
+    stream = network_stream({"frequencies_of": model, "size": size, "seed": int(row["seed"])})
+    return natural_frequencies(size, kind, row["omega"], row["width"], stream)

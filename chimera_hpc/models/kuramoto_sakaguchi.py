@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chimera_hpc.models.frequencies import frequencies_of, frequency_parameters
 from chimera_hpc.models.network_model import PhaseModel
+from chimera_hpc.models.parameters import NETWORK_SIZE, ModelParameters, Parameter
+from chimera_hpc.models.protocol import BuiltIn, Row
+from chimera_hpc.network.network import Network
 
 Array = NDArray[np.float64]
 
@@ -71,3 +75,20 @@ class KuramotoSakaguchi(PhaseModel):
         pair = self.coupling * np.array([math.cos(self.phase_lag), math.sin(self.phase_lag)])
         work = np.zeros(2 * self.n_nodes + 2 * self.packed.n_shared)
         return np.concatenate([pair, self._each("omega", self.omega), work])
+
+
+def _on_network(network: Network, sweep: Any, row: Row) -> KuramotoSakaguchi:
+    omega = frequencies_of(row, KuramotoSakaguchi.name, network.n_nodes)
+    return KuramotoSakaguchi(network, row["coupling"], row["phase_lag"], omega)
+
+
+PARAMETERS = ModelParameters(
+    n_nodes=NETWORK_SIZE,
+    parameters=(
+        Parameter("coupling", float, 1.0, "Strength K of the coupling, for each link."),
+        Parameter("phase_lag", float, 0.0, "Phase lag alpha (rad)."),
+        *frequency_parameters(0.0),
+    ),
+)
+
+MODEL = BuiltIn(PARAMETERS, on_network=_on_network)

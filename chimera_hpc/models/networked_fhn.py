@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.models.networked_fhn_network import on_network
 from chimera_hpc.models.parameters import (
     EPSILON,
     HALF_DEGREE,
@@ -133,4 +134,4 @@ PARAMETERS = ModelParameters(
     constants={"orientation": 1},
 )
 
-MODEL = BuiltIn(PARAMETERS, _build)
+MODEL = BuiltIn(PARAMETERS, _build, on_network)

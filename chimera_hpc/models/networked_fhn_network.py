@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.models.network_model import NetworkModel
+from chimera_hpc.models.protocol import Row
+from chimera_hpc.network.network import Network
 
 Array = NDArray[np.float64]
 
@@ -72,3 +74,8 @@ class NetworkFHN(NetworkModel):
         same, cross = self.sigma * math.cos(self.phi), self.sigma * math.sin(self.phi)
         work = np.zeros(2 * self.packed.n_shared)
         return np.concatenate([[1.0 / self.epsilon, self.b, same, cross], work])
+
+
+def on_network(network: Network, sweep: Any, row: Row) -> NetworkFHN:
+    """Return the model of one point on a network."""
+    return NetworkFHN(network, row["sigma"], row["epsilon"], row["b"], row["phi"])

@@ -84,6 +84,7 @@ class ModelParameters:
 
 HALF_DEGREE = "Links of a node to each side (half its degree); 2 P must be smaller than n_nodes."
 RING_LIMIT = Limit("P", (), lambda _, n: (n - 1) // 2, "2 P must be smaller than n_nodes")
+NETWORK_SIZE = Parameter("n_nodes", int, 50, "Nodes of the network.", low=1, high=10**7)
 EPSILON = Parameter("epsilon", float, 0.05, "Ratio of the two time scales.", above=0)
 
 

@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.models.csr import Packed, packed
+from chimera_hpc.models.frequencies import frequencies_of, frequency_parameters
 from chimera_hpc.models.network_model import PhaseModel
+from chimera_hpc.models.parameters import NETWORK_SIZE, ModelParameters, Parameter
+from chimera_hpc.models.protocol import BuiltIn, Row
 from chimera_hpc.network.complex import SIGNALS
+from chimera_hpc.network.network import Network
 
 Array = NDArray[np.float64]
 
@@ -119,3 +123,21 @@ class SimplicialKuramoto(PhaseModel):
         """This trajectory's column: K, omega, and work space."""
         omega = self._each("omega", self.omega)
         return np.concatenate([[self.coupling], omega, np.zeros(4 + self._n_projected)])
+
+
+def _on_network(network: Network, sweep: Any, row: Row) -> SimplicialKuramoto:
+    order = SIGNALS.index(getattr(sweep.network, "signals", "nodes"))
+    omega = frequencies_of(row, SimplicialKuramoto.name, network.size(SIGNALS[order]))
+    return SimplicialKuramoto(network, order, row["coupling"], omega, bool(row["explosive"]))
+
+
+PARAMETERS = ModelParameters(
+    n_nodes=NETWORK_SIZE,
+    parameters=(
+        Parameter("coupling", float, 1.0, "Strength K of the coupling."),
+        *frequency_parameters(0.0),
+        Parameter("explosive", int, 0, "1: each side by the other's order parameter.", 0, 1),
+    ),
+)
+
+MODEL = BuiltIn(PARAMETERS, on_network=_on_network)

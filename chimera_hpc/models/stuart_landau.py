@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chimera_hpc.models.frequencies import frequencies_of, frequency_parameters
 from chimera_hpc.models.network_model import NetworkModel
+from chimera_hpc.models.parameters import NETWORK_SIZE, ModelParameters, Parameter
+from chimera_hpc.models.protocol import BuiltIn, Row
+from chimera_hpc.network.network import Network
 
 Array = NDArray[np.float64]
 
@@ -76,3 +80,23 @@ class StuartLandau(NetworkModel):
         work = np.zeros(2 * self.packed.n_shared)
         numbers = [self.growth, self.shear, same, cross]
         return np.concatenate([numbers, self._each("omega", self.omega), work])
+
+
+def _on_network(network: Network, sweep: Any, row: Row) -> StuartLandau:
+    omega = frequencies_of(row, StuartLandau.name, network.n_nodes)
+    coupling, lag, growth = row["coupling"], row["phase_lag"], row["growth"]
+    return StuartLandau(network, coupling, lag, growth, omega, row["shear"])
+
+
+PARAMETERS = ModelParameters(
+    n_nodes=NETWORK_SIZE,
+    parameters=(
+        Parameter("coupling", float, 1.0, "Strength K of the coupling, for each link."),
+        Parameter("phase_lag", float, 0.0, "Phase lag alpha of the coupling (rad)."),
+        Parameter("growth", float, 1.0, "Growth rate lambda at z = 0."),
+        *frequency_parameters(1.0),
+        Parameter("shear", float, 0.0, "Shear gamma: by how much |z|^2 lowers the frequency."),
+    ),
+)
+
+MODEL = BuiltIn(PARAMETERS, on_network=_on_network)
