@@ -1,4 +1,4 @@
-"""Agreement between methods: classes by strength of incoherence, confusion matrices."""
+"""Agreement between methods: classes by SI, confusion matrices, Cohen's kappa, Rand index."""
 
 from __future__ import annotations
 
@@ -58,3 +58,15 @@ def confusion(
         if one in position and other in position:
             counts[position[one], position[other]] += 1
     return Confusion(tuple(classes), counts)
+
+
+def adjusted_rand(first: Sequence[str | None], second: Sequence[str | None]) -> float:
+    """Adjusted Rand index of two methods: 1 for equal partitions, 0 as by chance.
+
+    Names do not matter, only which runs are together. Runs without a class (None) by either method
+    are left out; NaN without any. Hubert, Arabie 1985, doi:10.1007/BF01908075.
+    """
+    from sklearn.metrics import adjusted_rand_score
+
+    both = [pair for pair in zip(first, second, strict=True) if None not in pair]
+    return float(adjusted_rand_score(*zip(*both, strict=True))) if both else float("nan")

@@ -83,7 +83,7 @@ ANALYSES = {
     "robustness": "chimera_hpc.reduction.analyses.judged:robustness",
     "incoherence": "chimera_hpc.reduction.analyses.incoherence:incoherence",
     "sigma-l": "chimera_hpc.reduction.analyses.incoherence:sigma_l",
-    "agreement": "chimera_hpc.reduction.analyses.incoherence:agreement",
+    "agreement": "chimera_hpc.reduction.analyses.agreement:agreement",
     "synthetic": "chimera_hpc.reduction.analyses.method:synthetic",
     "spectrum": "chimera_hpc.reduction.analyses.method:spectrum",
 }
@@ -105,6 +105,7 @@ FIGURES = {
     "incoherence_delta": "chimera_hpc.plot.incoherence:sensitivity_figure",
     "sigma_l": "chimera_hpc.plot.density:sigma_l_figure",
     "agreement": "chimera_hpc.plot.agreement:agreement_figure",
+    "agreement_matrix": "chimera_hpc.plot.agreement:matrix_figure",
     "verdicts": "chimera_hpc.plot.agreement:verdicts_figure",
     "reconstruction": "chimera_hpc.plot.synthetic:reconstruction_figure",
     "synthetic_signal": "chimera_hpc.plot.synthetic:signal_figure",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -12,33 +13,62 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from chimera_hpc.plot import style
-from chimera_hpc.plot.figure_input import FigureInput
+from chimera_hpc.plot.figure_input import FigureInput, numbers
+from chimera_hpc.plot.modes import Parameters, draw_modal_classes
 
-_SPOKEN = {"SI": "SI", "triplets": "triplets", "sigma_1": r"$\sigma_1$"}
+_SPOKEN = {
+    "sigma_1": r"$\sigma_1$",
+    "g0": "$g_0$",
+    "g0_global": "$g_0$, all pairs",
+    "acm": "ACM",
+}
+_MOST_MATRICES = 3
+
+
+def spoken(name: str) -> str:
+    """Return a measure's name as figures have it."""
+    return _SPOKEN.get(name, name)
 
 
 def agreement_figure(data: FigureInput) -> Figure | None:
-    """Draw a confusion matrix for each pair of methods."""
+    """Draw a confusion matrix for each pair of the first three methods."""
     entry = data.curves.get("agreement")
     if entry is None:
         return None
     comparisons = [
-        Comparison(_SPOKEN[p["rows"]], _SPOKEN[p["columns"]], entry["classes"], p["counts"])
-        for p in entry["pairs"]
+        Comparison(spoken(p["rows"]), spoken(p["columns"]), entry["classes"], p["counts"])
+        for p in entry["pairs"][:_MOST_MATRICES]
     ]
     return confusion_matrices(comparisons)
+
+
+def matrix_figure(data: FigureInput) -> Figure | None:
+    """Draw how far each two methods agree on the runs, of more than two methods."""
+    entry = data.curves.get("agreement")
+    if entry is None or len(entry["modal"]) < 3:
+        return None
+    names = list(entry["modal"])
+    values = np.full((len(names), len(names)), np.nan)
+    for pair in entry["pairs"]:
+        i, j = names.index(pair["rows"]), names.index(pair["columns"])
+        values[j, i], values[i, j] = numbers([pair["kappa"], pair["adjusted_rand"]])
+    return agreement_matrix([spoken(name) for name in names], values)
 
 
 def verdicts_figure(data: FigureInput) -> Figure | None:
     """Draw the modal class of each cell by each method, and mark where they differ."""
     entry = data.curves.get("agreement")
-    if entry is None or data.only_axis is None:
+    if entry is None or len(data.axes) not in (1, 2):
         return None
-    label, x = data.only_axis
-    methods: Mapping[str, Sequence[str | None]] = {
-        _SPOKEN[name]: classes for name, classes in entry["modal"].items()
-    }
+    methods: Methods = {spoken(name): classes for name, classes in entry["modal"].items()}
+    if len(data.axes) == 2:
+        return verdict_maps(data.axes, methods)
+    label, x = data.axes[0]
     return verdicts(x, methods, label=label)
+
+
+Methods = Mapping[str, Sequence[str | None]]
+"""Class of each cell (k,) by the name of the method."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +109,7 @@ def _draw_matrix(axes: Axes, comparison: Comparison) -> None:
 
 
 @style.styled
-def verdicts(
-    x: ArrayLike, methods: Mapping[str, Sequence[str | None]], *, label: str = "$P$"
-) -> Figure:
+def verdicts(x: ArrayLike, methods: Methods, *, label: str = "$P$") -> Figure:
     """Draw each method's class for each cell x (k,) in a row; a bar marks where they differ."""
     values = np.asarray(x, dtype=np.float64)
     figure, (axes,) = style.new_panels(1, style.PAGE - 0.8, 1.1 + 0.36 * len(methods))
@@ -99,3 +127,52 @@ def verdicts(
     axes.set_xlabel(label)
     style.add_class_legend(figure, filter(None, chain(*methods.values())))
     return figure
+
+
+@style.styled
+def agreement_matrix(names: Sequence[str], values: ArrayLike) -> Figure:
+    """Draw a matrix (k, k): kappa below the diagonal, adjusted Rand index above; NaN is white."""
+    shown = np.asarray(values, dtype=np.float64)
+    side = 1.6 + 0.5 * len(names)
+    figure, (axes,) = style.new_panels(1, side + 0.6, side)
+    image = axes.imshow(shown, cmap="RdBu", vmin=-1.0, vmax=1.0)
+    for (row, column), value in np.ndenumerate(shown):
+        if np.isfinite(value):
+            shade = "white" if abs(value) > 0.6 else "black"
+            axes.text(column, row, f"{value:.2f}", ha="center", va="center", color=shade)
+    axes.set_xticks(range(len(names)), names, rotation=30.0, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), names)
+    axes.set_title("below: Cohen's $\\kappa$, above: adjusted Rand index")
+    figure.colorbar(image, ax=axes, shrink=0.8)
+    return figure
+
+
+@style.styled
+def verdict_maps(parameters: Parameters, methods: Methods) -> Figure:
+    """Draw each method's class over the plane of two parameters, and the share that is shared.
+
+    The last panel is the share of methods, of those with a class, that give the most frequent one.
+    """
+    figure, axes = style.new_panels(len(methods) + 1, 2.1 * (len(methods) + 1), 2.6, sharey=True)
+    for frame, (name, classes) in zip(axes, methods.items(), strict=False):
+        draw_modal_classes(frame, parameters, classes)
+        frame.set_title(name)
+    (x_label, x), (y_label, y) = parameters
+    across, column = np.unique(np.asarray(x, float), return_inverse=True)
+    up, row = np.unique(np.asarray(y, float), return_inverse=True)
+    shares = np.full((len(across), len(up)), np.nan)
+    shares[column, row] = [_shared(cell) for cell in zip(*methods.values(), strict=True)]
+    mesh = style.draw_shares(axes[-1], across, up, shares)
+    axes[-1].set_xlabel(x_label)
+    axes[-1].set_title("share that agrees")
+    for frame in axes[1:]:
+        frame.set_ylabel("")
+    axes[0].set_ylabel(y_label)
+    figure.colorbar(mesh, ax=axes[-1])
+    style.add_class_legend(figure, filter(None, chain(*methods.values())))
+    return figure
+
+
+def _shared(classes: Sequence[str | None]) -> float:
+    known = Counter(filter(None, classes))
+    return max(known.values()) / known.total() if known else float("nan")

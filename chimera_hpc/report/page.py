@@ -21,6 +21,12 @@ from chimera_hpc import __version__
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
+from chimera_hpc.reduction.agreement_text import (
+    CAPTION,
+    differing_line,
+    differing_rows,
+    matrix_rows,
+)
 from chimera_hpc.reduction.atlases import curves_beside
 from chimera_hpc.reduction.audit_text import (
     HEAD,
@@ -101,6 +107,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "spec": json.dumps(content.store.sweep.to_dict(), indent=1),
         "claims": content.results.get("claims", []),
         "audit": _audit(content),
+        "agreement": _agreement(content),
         "names": {name: list(group) for name, group in _groups(figures).items()},
         "script": loader.get_source(environment, "report.js")[0],
         "style": loader.get_source(environment, "report.css")[0],
@@ -150,6 +157,20 @@ def _robustness(content: Content) -> dict[str, Mapping[str, Any]]:
             label = str(entry["label"]).replace("$", "")
             found[f"{label}, judged by {judge}"] = curve
     return found
+
+
+def _agreement(content: Content) -> dict[str, Any]:
+    """Return what the page shows of the agreement between measures; empty without it."""
+    entry = content.results.get("curves", {}).get("agreement")
+    if not entry:
+        return {}
+    return {
+        "caption": CAPTION,
+        "matrix": matrix_rows(entry),
+        "rules": entry.get("rules", {}),
+        "line": differing_line(entry),
+        "cells": differing_rows(entry),
+    }
 
 
 def _audit(content: Content) -> dict[str, Any]:

@@ -1,18 +1,16 @@
-"""Analyses of the differences of neighbours: SI, discontinuity measure, sigma_l, agreement."""
+"""Analyses of the differences of neighbours: SI, discontinuity measure, sigma_l."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.base.errors import BadInput
-from chimera_hpc.classify.agreement import classes_by_incoherence, confusion
+from chimera_hpc.classify.agreement import classes_by_incoherence
 from chimera_hpc.classify.density import density_classes, stable_bandwidths
-from chimera_hpc.classify.naming import CLASSES, STEADY
+from chimera_hpc.classify.naming import CLASSES
 from chimera_hpc.measures.incoherence import discontinuity_measure, strength_of_incoherence
 from chimera_hpc.reduction.analyses.judged import most_frequent
 from chimera_hpc.reduction.analysis_input import AnalysisInput
@@ -42,7 +40,7 @@ def incoherence(given: AnalysisInput) -> dict[str, Any]:
 
 def _by_unit(given: AnalysisInput, unit: str) -> dict[str, Any]:
     local, scale = given.local_sigma(), unit_of(given, unit)
-    curve = np.stack([_strength(local, scale, delta) for delta in _CURVE], axis=1)
+    curve = np.stack([strengths(local, scale, delta) for delta in _CURVE], axis=1)
     return {
         "by_delta": [_at_delta(given, local, scale, d) for d in given.sweep.reduction.deltas],
         "curve": {
@@ -57,7 +55,8 @@ def unit_of(given: AnalysisInput, unit: str) -> Array:
     return given.scalar("range_u") if unit == "range" else np.ones(len(given.status))
 
 
-def _strength(local: Array, scale: Array, delta: float) -> Array:
+def strengths(local: Array, scale: Array, delta: float) -> Array:
+    """Return SI for each run, shape (n,); NaN where `scale` is."""
     made: Array = np.full(len(local), np.nan)
     known = np.isfinite(scale)
     made[known] = strength_of_incoherence(local[known], delta * scale[known])
@@ -65,7 +64,7 @@ def _strength(local: Array, scale: Array, delta: float) -> Array:
 
 
 def _at_delta(given: AnalysisInput, local: Array, scale: Array, delta: float) -> dict[str, Any]:
-    strength = _strength(local, scale, delta)
+    strength = strengths(local, scale, delta)
     known = np.isfinite(scale)
     jumps = np.full(len(local), np.nan)
     jumps[known] = discontinuity_measure(local[known], delta * scale[known])
@@ -119,61 +118,3 @@ def sigma_l(given: AnalysisInput) -> dict[str, Any]:
         "labels": made.labels,
         "cells": rows,
     }
-
-
-def agreement(given: AnalysisInput) -> dict[str, Any]:
-    """Triplets, SI (first of ``reduction.deltas``) and sigma_1 on the same runs and cells.
-
-    Steady runs count as ordered. Runs count one by one in the confusion matrices; ``differing``
-    lists the cells whose modal classes are not all equal.
-    """
-    given.need_runs()
-    if not given.sweep.reduction.deltas:
-        raise BadInput("reduction.deltas is needed")
-    triplet = ["ordered" if n == STEADY else n for n in given.own_names()]
-    scale = unit_of(given, given.sweep.reduction.delta_unit)
-    delta = given.sweep.reduction.deltas[0]
-    strength = _strength(given.local_sigma(), scale, delta)
-    by_strength: list[str | None] = list(classes_by_incoherence(np.nan_to_num(strength)))
-    density = density_classes(np.where(given.has_result, given.scalar("sigma_1"), np.nan))
-    by_density = [density.names[k] if k >= 0 else None for k in density.labels]
-    methods = {"triplets": triplet, "SI": by_strength, "sigma_1": by_density}
-    for names in methods.values():
-        for run in np.flatnonzero(~given.has_result):
-            names[run] = None
-    modal = {name: _modal(given, verdicts) for name, verdicts in methods.items()}
-    pairs = [("triplets", "SI"), ("triplets", "sigma_1"), ("SI", "sigma_1")]
-    return {
-        "delta": delta,
-        "classes": CLASSES,
-        "pairs": [_pair(methods, modal, *pair) for pair in pairs],
-        "modal": modal,
-        "cells": [given.place(i) for i in range(given.n_cells)],
-        "differing": [
-            given.place(i) | {name: verdicts[i] for name, verdicts in modal.items()}
-            for i in range(given.n_cells)
-            if len({verdicts[i] for verdicts in modal.values()}) > 1
-        ],
-    }
-
-
-def _pair(
-    methods: dict[str, list[str | None]], modal: dict[str, list[str | None]], row: str, column: str
-) -> dict[str, Any]:
-    runs = confusion(methods[row], methods[column])
-    cells = confusion(modal[row], modal[column])
-    return {
-        "rows": row,
-        "columns": column,
-        "counts": runs.counts,
-        "agreement": runs.agreement,
-        "kappa": runs.kappa,
-        "cells_equal": int(np.trace(cells.counts)),
-        "cells": int(cells.counts.sum()),
-    }
-
-
-def _modal(given: AnalysisInput, verdicts: Sequence[str | None]) -> list[str | None]:
-    return [
-        most_frequent(Counter(verdicts[run] for run in given.runs(i))) for i in range(given.n_cells)
-    ]
