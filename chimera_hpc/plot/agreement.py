@@ -140,7 +140,7 @@ def agreement_matrix(names: Sequence[str], values: ArrayLike) -> Figure:
         if np.isfinite(value):
             shade = "white" if abs(value) > 0.6 else "black"
             axes.text(column, row, f"{value:.2f}", ha="center", va="center", color=shade)
-    axes.set_xticks(range(len(names)), names, rotation=30.0, ha="right", rotation_mode="anchor")
+    axes.set_xticks(range(len(names)), names, rotation=90.0)
     axes.set_yticks(range(len(names)), names)
     axes.set_title("below: Cohen's $\\kappa$, above: adjusted Rand index")
     figure.colorbar(image, ax=axes, shrink=0.8)

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chimera_hpc.classify.agreement import classes_by_incoherence, confusion
+from chimera_hpc.classify.agreement import adjusted_rand, classes_by_incoherence, confusion
+from chimera_hpc.classify.verdicts import RULES
 
 
 def test_strength_of_incoherence_names_classes() -> None:
@@ -33,3 +34,21 @@ def test_measures_without_runs_are_nan() -> None:
     assert np.isnan(found.agreement)
     assert np.isnan(found.kappa)
     assert np.isnan(confusion(["ordered"], ["ordered"]).kappa)
+
+
+def test_adjusted_rand_ignores_names_and_runs_without_a_class() -> None:
+    first = ["a", "a", "b", "b", None, "a"]
+    assert adjusted_rand(first, ["x", "x", "y", "y", "x", None]) == 1.0
+    # of 6 pairs 3 and 2 are together, 1 by both, as by chance: 3 * 2 / 6
+    assert adjusted_rand(["a", "a", "a", "b"], ["x", "x", "y", "y"]) == pytest.approx(0.0)
+    assert np.isnan(adjusted_rand([None], ["x"]))
+
+
+def test_rules_name_runs_by_one_number() -> None:
+    rules = {rule.quantity: rule for rule in RULES}
+    named = rules["plateau"].classes([1.0, 0.98, 0.11, 0.1, 0.02, np.nan])
+    assert named == ["ordered", "chimera", "chimera", "disordered", "disordered", None]
+    assert rules["acm"].classes([0.95, 0.94, 0.06, 0.05]) == [
+        *("ordered", "chimera", "chimera", "disordered")
+    ]
+    assert "Kemeth et al. 2016" in rules["g0"].text

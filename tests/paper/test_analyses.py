@@ -16,6 +16,7 @@ from chimera_hpc.classify.stability import (
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.registry import ANALYSES, load
 from chimera_hpc.network.topology import Topology
+from chimera_hpc.reduction.agreement_text import agreement_lines, differing_rows, matrix_rows
 from chimera_hpc.reduction.analyses import analyse
 from chimera_hpc.reduction.analysis_input import AnalysisInput
 
@@ -186,6 +187,36 @@ def test_methods_that_differ_are_listed_by_cell() -> None:
     made = load(ANALYSES["agreement"])(runs)
     assert [cell["P"] for cell in made["differing"]] == [5]
     np.testing.assert_array_equal(made["pairs"][0]["counts"], [[0, 12, 0], [0, 12, 0], [0, 0, 12]])
+
+
+def test_measures_of_the_panel_join_the_agreement_after_the_first_three() -> None:
+    runs = three_kinds()
+    values = np.repeat([1.0, 0.5, 0.02], 12)
+    columns = {**runs.scalars, "acm": values, "plateau": np.where(values < 0.5, 1.0, values)}
+    status = runs.status.copy()
+    status[0] = STEADY
+    columns["acm"] = np.where(status == STEADY, np.nan, values)
+    given_runs = AnalysisInput(**{**vars(runs), "scalars": columns, "status": status})
+    made = load(ANALYSES["agreement"])(given_runs)
+    assert (
+        list(made["modal"]) == ["triplets", "SI", "sigma_1", "plateau", "acm"] == [*made["rules"]]
+    )
+    pairs = {(pair["rows"], pair["columns"]): pair for pair in made["pairs"]}
+    order = [*pairs][:4]
+    assert order == [
+        *(("triplets", "SI"), ("triplets", "sigma_1"), ("SI", "sigma_1"), ("triplets", "plateau"))
+    ]
+    whole = pairs["SI", "acm"]
+    assert (whole["kappa"], whole["adjusted_rand"], whole["cells_kappa"]) == (1.0, 1.0, 1.0)
+    # 24 of 36 agree: (2/3 - 1/3) / (1 - 1/3)
+    assert pairs["SI", "plateau"]["kappa"] == pytest.approx(0.5)
+    assert [cell["plateau"] for cell in made["differing"]] == ["ordered"]
+    rows = matrix_rows(made)
+    assert rows[0] == ("", "triplets", "SI", "sigma_1", "plateau", "acm")
+    assert (rows[4][2], rows[5][2], rows[2][5]) == ("0.50", "1.00", "1.00")
+    assert agreement_lines(made)[-1] == "the measures differ in 1 of 3 cells"
+    assert differing_rows(made)[0][0] == "P, Q"
+    assert len(differing_rows(made)) == 2
 
 
 def test_variations_are_quantiles_of_oscillating_runs() -> None:

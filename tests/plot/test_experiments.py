@@ -12,7 +12,13 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from chimera_hpc.plot import style
-from chimera_hpc.plot.agreement import Comparison, confusion_matrices, verdicts
+from chimera_hpc.plot.agreement import (
+    Comparison,
+    agreement_matrix,
+    confusion_matrices,
+    verdict_maps,
+    verdicts,
+)
 from chimera_hpc.plot.atlas import Diamonds, atlas
 from chimera_hpc.plot.basin import basin
 from chimera_hpc.plot.density import Density, density_classes
@@ -230,3 +236,25 @@ def test_verdicts_mark_cells_where_methods_differ(rendered: Render, colour_at: A
     assert colour_at(axes, 3, 0) == [tuple(np.round(to_rgb(style.BLUE), 6))]
     assert colour_at(axes, 3, 1) == [tuple(np.round(to_rgb(style.BLACK), 6))]
     assert colour_at(axes, 4, 0) == []
+
+
+def test_agreement_matrix_has_a_number_in_each_known_field(rendered: Render) -> None:
+    values = np.array([[np.nan, 0.5, np.nan], [0.25, np.nan, -0.1], [1.0, 0.0, np.nan]])
+    axes = rendered(agreement_matrix(["SI", "ACM", "plateau"], values)).axes[0]
+    shown = {text.get_position(): text.get_text() for text in axes.texts}
+    assert shown[(0, 1)] == "0.25"
+    assert shown[(2, 1)] == "-0.10"
+    assert len(shown) == 5
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["SI", "ACM", "plateau"]
+
+
+def test_verdict_maps_show_the_share_that_agrees(rendered: Render) -> None:
+    plane = [("$P$", [2, 2, 3, 3]), ("$Q$", [0, 1, 0, 1])]
+    methods = {
+        "SI": ["ordered", "chimera", "ordered", None],
+        "ACM": ["ordered", "ordered", "ordered", "chimera"],
+    }
+    *maps, share, _ = rendered(verdict_maps(plane, methods)).axes
+    assert [axes.get_title() for axes in maps] == ["SI", "ACM"]
+    (mesh,) = share.collections
+    np.testing.assert_array_equal(mesh.get_array(), [[1.0, 1.0], [0.5, 1.0]])

@@ -178,6 +178,20 @@ def test_claims_of_the_results_are_shown(tmp_path, filled):
     assert "one W is 1 0.5 ✗ no" in words_of(page_of(tmp_path))
 
 
+def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
+    wish = ('reduction.analyses=["agreement"]', "reduction.deltas=[0.1]")
+    filled(tmp_path, *PLANE, *wish, 'reduction.delta_unit="absolute"')
+    assert main(["reduce", str(tmp_path)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    head = "triplets SI sigma_1"
+    caption = "Cohen's kappa of the runs below the diagonal, adjusted Rand index above it"
+    assert f"{caption}: {head}" in told
+    words = words_of(page_of(tmp_path)).replace("&#39;", "'")
+    assert f"1 is full agreement, 0 as by chance, - not defined. {head} triplets" in words
+    assert "sigma_1: modes of its density The measures differ in " in words
+    assert (tmp_path / "figures").exists() is False  # none is asked for
+
+
 def test_robustness_curves_have_a_chart(tmp_path, filled):
     filled(tmp_path, FAST)
     curve = {"x": [0, 1], "fraction": [1.0, 0.5], "low": [0.8, 0.2], "high": [1.0, 0.8]}
