@@ -180,6 +180,7 @@ def test_claims_of_the_results_are_shown(tmp_path, filled):
 
 def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
     wish = ('reduction.analyses=["agreement"]', "reduction.deltas=[0.1]")
+    wish += ('reduction.figures=["verdicts"]',)
     filled(tmp_path, *PLANE, *wish, 'reduction.delta_unit="absolute"')
     assert main(["reduce", str(tmp_path)]) == 0
     told = " ".join(capsys.readouterr().out.split())
@@ -189,7 +190,7 @@ def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
     words = words_of(page_of(tmp_path)).replace("&#39;", "'")
     assert f"1 is full agreement, 0 as by chance, - not defined. {head} triplets" in words
     assert "sigma_1: modes of its density The measures differ in " in words
-    assert (tmp_path / "figures").exists() is False  # none is asked for
+    assert (tmp_path / "figures" / "verdicts.png").stat().st_size > 0
 
 
 def test_robustness_curves_have_a_chart(tmp_path, filled):
