@@ -8,6 +8,8 @@ from chimera_hpc.base.exits import Exit
 from chimera_hpc.cli.arguments import add, load_job, sweep_folder
 from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, refuse_absurd
 from chimera_hpc.cli.run import check_drawing
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.models import build
 
 EPILOG = """examples:
   python -m chimera_hpc.sweep plan jobs/quickstart.toml
@@ -28,6 +30,8 @@ def execute(args: Namespace) -> int:
     folder = sweep_folder(args.out, sweep, args.job)
     need = estimate(sweep)
     print(f"sweep       {sweep.name} ({sweep.model}), digest {sweep.digest}")
+    if sweep.network is not None:
+        print(f"network     {sweep.network.kind}; {_coupling(sweep)}")
     print(f"axes        {', '.join(need.axes)}")
     print(f"points      {need.points} in {need.cells} cells")
     print(f"blocks      {need.blocks} of up to {need.block} points")
@@ -36,3 +40,10 @@ def execute(args: Namespace) -> int:
     print(f"work        about {in_time(need.seconds)} on one core")
     refuse_absurd(sweep, need, folder, args.yes)
     return Exit.COMPLETE
+
+
+def _coupling(sweep: Sweep) -> str:
+    """Return how a slope of the first point is computed, which its network decides."""
+    model = build(sweep, sweep.points().row(0))
+    kernel = getattr(model, "kernel", "the model's own right-hand side")
+    return f"the first point by {kernel}"

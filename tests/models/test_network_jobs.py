@@ -16,6 +16,7 @@ from chimera_hpc.job.models import build
 from chimera_hpc.models.networked_fhn_network import NetworkFHN
 from chimera_hpc.network.sweep_network import network_of
 from chimera_hpc.run.block import run_block
+from chimera_hpc.sweep import main
 
 CLASSES = {
     "kuramoto_sakaguchi": KuramotoSakaguchi,
@@ -71,6 +72,19 @@ def test_frequencies_belong_to_the_seed(name):
     np.testing.assert_array_equal(omegas[0], expected)
     same = sweep(name, omega=2.0, width=0.5)
     np.testing.assert_array_equal(build(same, same.points().row(0)).omega, np.full(12, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("rewire", "kernel"), [(0.0, "sliding sums"), (0.5, "sparse rows, 48 entries")]
+)
+def test_plan_says_how_a_slope_is_computed(tmp_path, capsys, rewire, kernel):
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'name = "x"\nmodel = "topological_fhn"\n[network]\nkind = "small_world"\n'
+        f"[grid]\nrewire = [{rewire}]\nseeds = 2\n[fixed]\nn_nodes = 12\nP = 2\n"
+    )
+    assert main(["plan", str(job)]) == 0
+    assert f"network     small_world; the first point by {kernel}\n" in capsys.readouterr().out
 
 
 def test_phases_without_a_network_are_on_the_papers_ring():

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import naive
 import numpy as np
@@ -25,6 +29,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.lanes import Control
 from chimera_hpc.integrate.simd import LANES
 
+TESTS = Path(__file__).parents[1]
 DIRECTED = Network(
     6, np.array([[0, 1], [1, 2], [2, 0], [3, 2], [4, 3], [5, 4], [0, 5]]), directed=True
 )
@@ -251,3 +256,42 @@ def test_start_of_another_kind_is_refused():
         simulate("kuramoto_sakaguchi", phase0=np.zeros(3))
     with pytest.raises(AttributeError, match="stuart_landau has no phases"):
         _ = simulate(planar, u0=np.zeros(4), v0=np.zeros(4), t_end=0.1).phase
+
+
+# --- without compilation --------------------------------------------------------------------------
+
+SLOPES = """
+import numpy as np
+from networks_for_tests import complete, random_complex, slopes
+from chimera_hpc import *
+
+network, plain = random_complex(1, n=8), random_complex(1, n=8, weighted=False)
+models = [
+    TopologicalFHN(plain),
+    TopologicalFHN(network, signals="links"),
+    TopologicalFHN(network, signals="links", form="full"),
+    TopologicalFHN(complete(16)),
+    KuramotoSakaguchi(network, 0.5, 0.3),
+    StuartLandau(complete(16), 0.1, 0.2),
+    NetworkFHN(plain),
+    SimplicialKuramoto(plain, explosive=True),
+]
+for model in models:
+    states = np.random.default_rng(0).uniform(-3, 3, (model.n_rows, 8))
+    found = slopes([model] * 8, states)
+    assert slopes([model], states[:, 2:3]).tobytes() == found[:, 2:3].tobytes()
+    print(found.sum(axis=0).tobytes().hex(), found[0].tobytes().hex())
+"""
+
+
+def test_plain_python_gives_the_same_bits():
+    said = []
+    for disabled in ("0", "1"):
+        environment = os.environ | {"NUMBA_DISABLE_JIT": disabled}
+        environment["PYTHONPATH"] = os.pathsep.join(map(str, (TESTS.parent, TESTS)))
+        command = [sys.executable, "-c", SLOPES]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        said.append(done.stdout.split())
+    assert len(said[0]) == 16
+    assert said[0] == said[1]
