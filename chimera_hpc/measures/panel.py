@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.measures.measure import Measure, MeasuredRun
 
@@ -12,10 +13,15 @@ BAD_FIT = 0.5
 """R^2 below which a sine does not describe a node: more of its variance is in the rest."""
 
 
+def _pairs(run: MeasuredRun) -> str | NDArray[np.int64]:
+    return "ring" if run.pairs is None else run.pairs
+
+
 def _order(run: MeasuredRun) -> Sequence[float]:
+    from chimera_hpc.measures.neighbours import neighbours
     from chimera_hpc.measures.order_parameters import run_orders
 
-    found = run_orders(run.u, run.w)
+    found = run_orders(run.u, run.w, neighbours(_pairs(run), run.u.shape[1]))
     return found.mean, found.deviation, float(found.local.mean()), float(found.local.min())
 
 
@@ -31,7 +37,7 @@ def _communities(run: MeasuredRun) -> Sequence[float]:
 def _correlations(run: MeasuredRun) -> Sequence[float]:
     from chimera_hpc.measures.correlations import g0, h0
 
-    space = g0(run.u)
+    space = g0(run.u, _pairs(run))
     return float(space.mean()), float(space.std()), float(g0(run.u, "global").mean()), h0(run.u)
 
 

@@ -290,6 +290,16 @@ def test_the_streamed_panel_equals_the_public_functions() -> None:
         assert found[name] == pytest.approx(value, rel=1e-9, abs=1e-12), name
 
 
+def test_a_network_gives_its_own_neighbours() -> None:
+    pairs = np.array([(i, (i + k) % 13) for i in range(13) for k in (1, 2)])
+    run = measured()._replace(pairs=pairs)
+    found = scalars(run, "order", "g0h0")
+    local = measures.local_order(measures.phases(run.u, run.w), pairs).mean()
+    assert found["R_local"] == pytest.approx(local, rel=1e-9)
+    assert found["R_local"] != pytest.approx(scalars(measured(), "order")["R_local"], rel=1e-3)
+    assert found["g0"] == measures.g0(run.u, pairs).mean()
+
+
 def test_bursts_are_badly_fitted() -> None:
     run = measured()
     u = np.exp(-0.5 * ((run.t[:, None] + 0.1 * np.arange(5)) % 1.0 / 0.02) ** 2)
