@@ -84,6 +84,8 @@ ANALYSES = {
     "incoherence": "chimera_hpc.reduction.analyses.incoherence:incoherence",
     "sigma-l": "chimera_hpc.reduction.analyses.incoherence:sigma_l",
     "agreement": "chimera_hpc.reduction.analyses.agreement:agreement",
+    "classifiers": "chimera_hpc.reduction.analyses.clusters:classifiers",
+    "number-of-classes": "chimera_hpc.reduction.analyses.clusters:number_of_classes",
     "synthetic": "chimera_hpc.reduction.analyses.method:synthetic",
     "spectrum": "chimera_hpc.reduction.analyses.method:spectrum",
 }
@@ -106,6 +108,7 @@ FIGURES = {
     "sigma_l": "chimera_hpc.plot.density:sigma_l_figure",
     "agreement": "chimera_hpc.plot.agreement:agreement_figure",
     "agreement_matrix": "chimera_hpc.plot.agreement:matrix_figure",
+    "class_number": "chimera_hpc.plot.class_number:class_number_figure",
     "verdicts": "chimera_hpc.plot.agreement:verdicts_figure",
     "reconstruction": "chimera_hpc.plot.synthetic:reconstruction_figure",
     "synthetic_signal": "chimera_hpc.plot.synthetic:signal_figure",

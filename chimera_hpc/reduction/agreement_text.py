@@ -34,6 +34,16 @@ def matrix_rows(entry: Agreement) -> list[tuple[str, ...]]:
     return [("", *names), *rows]
 
 
+def cluster_lines(curves: Mapping[str, Any]) -> list[str]:
+    """Return what analyses found of the number of classes, and of other classifiers."""
+    lines = [curves["number-of-classes"]["sentence"]] if "number-of-classes" in curves else []
+    for pair in curves.get("classifiers", {"pairs": []})["pairs"]:
+        index = pair["adjusted_rand"]
+        text = "not defined" if index is None or index != index else f"{index:.2f}"
+        lines.append(f"{pair['rows']} and {pair['columns']}: adjusted Rand index {text}")
+    return lines
+
+
 def agreement_lines(entry: Agreement) -> list[str]:
     """Return the caption, the table, and how many cells the measures differ in."""
     rows = matrix_rows(entry)

@@ -16,7 +16,7 @@ from chimera_hpc.base.files import remove_leftovers, temporary_name, write_atomi
 from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.modes import run_names
-from chimera_hpc.reduction.agreement_text import agreement_lines
+from chimera_hpc.reduction.agreement_text import agreement_lines, cluster_lines
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.caveat import caveats
@@ -311,6 +311,8 @@ class _Work:
         if "agreement" in self.curves:
             for line in agreement_lines(self.curves["agreement"]):
                 self._say(line)
+        for line in cluster_lines(self.curves):
+            self._say(line)
         for line in self.results["warnings"]:
             self.note(f"warning: {line}")
         self._say(f"store    {self.store.path}")

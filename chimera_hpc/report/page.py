@@ -23,6 +23,7 @@ from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
 from chimera_hpc.reduction.agreement_text import (
     CAPTION,
+    cluster_lines,
     differing_line,
     differing_rows,
     matrix_rows,
@@ -108,6 +109,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "claims": content.results.get("claims", []),
         "audit": _audit(content),
         "agreement": _agreement(content),
+        "clusters": cluster_lines(content.results.get("curves", {})),
         "names": {name: list(group) for name, group in _groups(figures).items()},
         "script": loader.get_source(environment, "report.js")[0],
         "style": loader.get_source(environment, "report.css")[0],

@@ -16,7 +16,12 @@ from chimera_hpc.classify.stability import (
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.registry import ANALYSES, load
 from chimera_hpc.network.topology import Topology
-from chimera_hpc.reduction.agreement_text import agreement_lines, differing_rows, matrix_rows
+from chimera_hpc.reduction.agreement_text import (
+    agreement_lines,
+    cluster_lines,
+    differing_rows,
+    matrix_rows,
+)
 from chimera_hpc.reduction.analyses import analyse
 from chimera_hpc.reduction.analysis_input import AnalysisInput
 
@@ -217,6 +222,19 @@ def test_measures_of_the_panel_join_the_agreement_after_the_first_three() -> Non
     assert agreement_lines(made)[-1] == "the measures differ in 1 of 3 cells"
     assert differing_rows(made)[0][0] == "P, Q"
     assert len(differing_rows(made)) == 2
+
+
+def test_other_classifiers_stand_next_to_the_tree() -> None:
+    runs = three_kinds()
+    made = load(ANALYSES["classifiers"])(runs)
+    assert list(made["labels"]) == ["agglomerative", "kmeans", "mixture", "hdbscan"]
+    assert made["sizes"]["kmeans"].sum() == 36
+    assert [pair["adjusted_rand"] for pair in made["pairs"]][:2] == [1.0, 1.0]
+    curves = {"classifiers": made, "number-of-classes": load(ANALYSES["number-of-classes"])(runs)}
+    lines = cluster_lines(curves)
+    assert lines[0].startswith("36 of 36 runs look like 3 classes (gap statistic ")
+    assert lines[1] == "agglomerative and kmeans: adjusted Rand index 1.00"
+    assert cluster_lines({}) == []
 
 
 def test_variations_are_quantiles_of_oscillating_runs() -> None:

@@ -21,6 +21,7 @@ from chimera_hpc.plot.agreement import (
 )
 from chimera_hpc.plot.atlas import Diamonds, atlas
 from chimera_hpc.plot.basin import basin
+from chimera_hpc.plot.class_number import class_number
 from chimera_hpc.plot.density import Density, density_classes
 from chimera_hpc.plot.incoherence import Strengths, incoherence
 from chimera_hpc.plot.network import arrow_heads, networks, node_places
@@ -258,3 +259,21 @@ def test_verdict_maps_show_the_share_that_agrees(rendered: Render) -> None:
     assert [axes.get_title() for axes in maps] == ["SI", "ACM"]
     (mesh,) = share.collections
     np.testing.assert_array_equal(mesh.get_array(), [[1.0, 1.0], [0.5, 1.0]])
+
+
+def test_class_number_marks_the_answer_of_each_measure(rendered: Render) -> None:
+    entry = {
+        "gap": [0.1, 0.5, 0.4],
+        "gap_error": [0.1, 0.1, 0.1],
+        "silhouette": [None, 0.8, 0.4],
+        "stability": [1.0, 0.99, 0.5],
+        "by": {"gap statistic": 2, "silhouette": 2, "stability": 2},
+    }
+    axes = rendered(class_number(entry)).axes
+    assert [one.get_title("left").split(") ")[-1] for one in axes] == [
+        "gap statistic: 2",
+        "silhouette: 2",
+        "stability: 2",
+    ]
+    assert axes[1].lines[0].get_ydata()[1:].tolist() == [0.8, 0.4]
+    assert axes[0].lines[-1].get_xdata() == [2, 2]

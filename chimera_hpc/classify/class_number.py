@@ -1,0 +1,179 @@
+r"""How many classes do runs hold: gap statistic, silhouette and stability for k = 1 .. 8.
+
+All three look at Ward's clusters of points scaled to [0, 1].
+
+- Gap statistic: ``Gap(k) = <log W*(k)> - log W(k)``, W the sum of squared distances from the
+  centroids, W* that of points that are uniform in the box along the principal axes. The number is
+  the smallest k with Gap(k) >= Gap(k+1) - s(k+1). Tibshirani, Walther, Hastie 2001,
+  doi:10.1111/1467-9868.00293.
+- Silhouette: mean of (b - a) / max(a, b), a and b the mean distances to the own and to the nearest
+  other cluster, for k > 1. Rousseeuw 1987, doi:10.1016/0377-0427(87)90125-7.
+- Stability: mean adjusted Rand index between the clusters of two random subsets of two thirds, on
+  the runs that both hold.
+
+Points far from all others but few are no class: they are set apart first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from chimera_hpc.classify import tree
+from chimera_hpc.classify.tree import Floats, Integers
+
+MOST = 8
+"""Largest number of classes that is tried."""
+SMALLEST = 0.05
+"""Least share of the runs that makes a class."""
+_FAR = 5.0
+"""Distance to the nearest runs beyond which a run is set apart, in those of nine tenths of all."""
+_REFERENCES = 20
+_DRAWS = 10
+_STABLE = 0.9
+_TIE = 0.005
+_CLEAR = 0.5
+"""Mean silhouette from which clusters are apart."""
+_MOST_POINTS = 1000
+
+
+@dataclass(frozen=True)
+class ClassNumber:
+    """Three answers, and the numbers behind them; arrays over k = 1, 2, ..."""
+
+    gap: Floats
+    gap_error: Floats
+    silhouette: Floats
+    """NaN for k = 1."""
+    stability: Floats
+    n_runs: int
+    n_apart: int
+    """Runs that were set apart."""
+
+    @property
+    def by_gap(self) -> int:
+        """The smallest k whose gap is not below the next one less its error."""
+        enough = np.flatnonzero(self.gap[:-1] >= self.gap[1:] - self.gap_error[1:])
+        return int(enough[0]) + 1 if enough.size else len(self.gap)
+
+    @property
+    def by_silhouette(self) -> int:
+        """The k with the largest silhouette, 1 if none is clear."""
+        best = int(np.nanargmax(self.silhouette)) if len(self.silhouette) > 1 else 0
+        return best + 1 if self.silhouette[best] >= _CLEAR else 1
+
+    @property
+    def by_stability(self) -> int:
+        """The largest k > 1 whose clusters come again as well as any, 1 if none do."""
+        best = float(self.stability[1:].max(initial=0.0))
+        if best < _STABLE:
+            return 1
+        return int(np.flatnonzero(self.stability[1:] >= best - _TIE).max()) + 2
+
+    @property
+    def answer(self) -> int:
+        """1 if gap or silhouette say so, else the k of the largest silhouette."""
+        return 1 if self.by_gap == 1 else self.by_silhouette
+
+    @property
+    def sentence(self) -> str:
+        """The answer in words."""
+        k, n = self.answer, self.n_runs - self.n_apart
+        each = (
+            f"gap statistic {self.by_gap}, silhouette {self.by_silhouette}, "
+            f"stability {self.by_stability}"
+        )
+        apart = f"; {self.n_apart} lie apart" if self.n_apart else ""
+        if k == 1:
+            return f"{n} of {self.n_runs} runs look like one state{apart} ({each})"
+        return f"{n} of {self.n_runs} runs look like {k} classes{apart} ({each})"
+
+
+def class_number(points: Floats, seed: int = 0) -> ClassNumber:
+    """Judge how many classes points (n, d), one a run, hold.
+
+    Of more than 1,000 points a random 1,000 are judged. The same points give the same answer.
+    """
+    rng = np.random.default_rng(seed)
+    chosen = points[np.lexsort(points.T)]
+    if len(chosen) > _MOST_POINTS:
+        chosen = chosen[np.sort(rng.choice(len(chosen), _MOST_POINTS, replace=False))]
+    apart = _far_from_others(tree.scale(chosen, tree.limits(chosen)))
+    kept = chosen[~apart]
+    scaled = tree.scale(kept, tree.limits(kept))
+    most = max(1, min(MOST, len(np.unique(scaled, axis=0)), len(scaled) - 1))
+    labels = _cuts(scaled, most)
+    gap, error = _gap(scaled, labels, rng)
+    return ClassNumber(
+        gap=gap,
+        gap_error=error,
+        silhouette=_silhouettes(scaled, labels),
+        stability=_stability(scaled, most, rng),
+        n_runs=len(chosen),
+        n_apart=int(apart.sum()),
+    )
+
+
+def _far_from_others(scaled: Floats) -> NDArray[np.bool_]:
+    """Tell which points have fewer neighbours than a class has members."""
+    members = max(3, int(np.ceil(SMALLEST * len(scaled))))
+    if len(scaled) <= 2 * members:
+        return np.zeros(len(scaled), dtype=np.bool_)
+    reach = cKDTree(scaled).query(scaled, k=members)[0][:, -1]
+    far: NDArray[np.bool_] = reach > _FAR * max(float(np.quantile(reach, 0.9)), 1e-9)
+    few = np.count_nonzero(far) <= 2 * members
+    return far if few else np.zeros_like(far)
+
+
+def _cuts(scaled: Floats, most: int) -> list[Integers]:
+    """Return the labels of Ward's clusters for k = 1 .. most."""
+    grown = tree.grow(scaled, "ward")
+    return [tree.cut(grown, k) for k in range(1, most + 1)]
+
+
+def _log_within(scaled: Floats, labels: Integers) -> float:
+    """Return log W, the sum of squared distances from the centroids."""
+    total = 0.0
+    for label in np.unique(labels):
+        members = scaled[labels == label]
+        total += float(np.square(members - members.mean(axis=0)).sum())
+    return float(np.log(max(total, 1e-300)))
+
+
+def _gap(scaled: Floats, labels: list[Integers], rng: np.random.Generator) -> tuple[Floats, Floats]:
+    centred = scaled - scaled.mean(axis=0)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
+    turned = centred @ axes.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    found = np.empty((_REFERENCES, len(labels)))
+    for row in found:
+        uniform = rng.uniform(low, high, turned.shape)
+        row[:] = [_log_within(uniform, made) for made in _cuts(uniform, len(labels))]
+    own = np.array([_log_within(scaled, made) for made in labels])
+    return found.mean(axis=0) - own, found.std(axis=0) * np.sqrt(1.0 + 1.0 / _REFERENCES)
+
+
+def _silhouettes(scaled: Floats, labels: list[Integers]) -> Floats:
+    from sklearn.metrics import silhouette_score
+
+    made = [float(silhouette_score(scaled, label)) for label in labels[1:]]
+    return np.array([np.nan, *made])
+
+
+def _stability(scaled: Floats, most: int, rng: np.random.Generator) -> Floats:
+    from sklearn.metrics import adjusted_rand_score
+
+    n = len(scaled)
+    found = np.ones((_DRAWS, most))
+    for row in found:
+        halves = [np.sort(rng.choice(n, max(2, 2 * n // 3), replace=False)) for _ in range(2)]
+        both, *places = np.intersect1d(halves[0], halves[1], return_indices=True)
+        cuts = [_cuts(scaled[half], most) for half in halves]
+        for k in range(1, most if len(both) else 0):
+            first, second = (cut[k][place] for cut, place in zip(cuts, places, strict=True))
+            row[k] = adjusted_rand_score(first, second)
+    stable: Floats = found.mean(axis=0)
+    return stable
