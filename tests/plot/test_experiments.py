@@ -270,7 +270,7 @@ def test_class_number_marks_the_answer_of_each_measure(rendered: Render) -> None
         "by": {"gap statistic": 2, "silhouette": 2, "stability": 2},
     }
     axes = rendered(class_number(entry)).axes
-    assert [one.get_title("left").split(") ")[-1] for one in axes] == [
+    assert [one.get_title("left").split(")")[-1].strip() for one in axes] == [
         "gap statistic: 2",
         "silhouette: 2",
         "stability: 2",
