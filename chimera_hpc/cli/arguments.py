@@ -80,8 +80,8 @@ _RESUBMIT = "go on up to N times, as the same SLURM job, when its time limit sto
 _STRICT = "refuse to go on with other code, libraries or processors than the results there have"
 _JOB = "the job file; quickstart, paper/plane and others come with the package"
 _MEMORY = (
-    "memory of a worker, e.g. 800M or 2G: a local one is ended beyond it (default: a fair share), "
-    "SLURM is asked for it (default: 1G)"
+    "memory of a worker, e.g. 800M or 2G: a local one is ended beyond it (default: the machine's "
+    "memory divided by the workers), SLURM is asked for it (default: 1G)"
 )
 _SHARED = {
     "job": value("JOB.toml", job_file, _JOB),

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from chimera_hpc.base.memory import share_of_memory
+from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.run.local_cluster import dask_size, existing_cluster, local_cluster
 
 if TYPE_CHECKING:
@@ -72,11 +74,21 @@ class ExecutorChoice:
             with existing_cluster(self.scheduler_file, patience=patience) as client:
                 yield client, _no_more
         else:
-            limit = dask_size(self.memory) if self.memory else "auto"
+            if self.workers > usable_cores():
+                say(_too_many(self.workers, usable_cores()))
+            limit = dask_size(self.memory) if self.memory else None
             with local_cluster(
                 self.workers, patience=patience, memory_limit=limit, meanwhile=meanwhile
             ) as client:
                 yield client, _no_more
+
+
+def _too_many(workers: int, cores: int) -> str:
+    share = share_of_memory(workers) / 1e9
+    return (
+        f"warning: {workers} workers share {cores} cores: more workers than cores are no faster, "
+        f"and each has {share:.3g} GB of memory unless --mem says otherwise; --workers {cores}"
+    )
 
 
 def _no_more() -> bool:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.memory import share_of_memory
 from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.run.fork_server import ONE_THREAD, signals_blocked, start_fork_server, start_method
 
@@ -71,7 +72,7 @@ def local_cluster(
     *,
     patience: float = 60.0,
     scratch: Path | None = None,
-    memory_limit: str | None = "auto",
+    memory_limit: str | None = None,
     meanwhile: Callable[[], object] | None = None,
 ) -> Iterator[Client]:
     """Start one-thread worker processes on this machine and give a client of them.
@@ -82,8 +83,8 @@ def local_cluster(
     workers: number of worker processes; 0 means one per core.
     patience: seconds after which a worker that gives no sign of life is replaced.
     scratch: folder for the workers' own files; a temporary one by default.
-    memory_limit: memory at which a worker is ended and replaced; a share of the machine's by
-        default.
+    memory_limit: memory at which a worker is ended and replaced. By default, the memory of the
+        machine, container or batch job divided by the number of workers.
     meanwhile: what to do in a thread while the workers start: this process only waits for them.
     """
     import dask
@@ -92,6 +93,7 @@ def local_cluster(
     if meanwhile is not None:
         threading.Thread(target=meanwhile, daemon=True).start()
 
+    number = workers or usable_cores()
     # As `NO_DASHBOARD` says it on a command line.
     listening = {"host": LOOPBACK, "dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}
     worker = {
@@ -99,7 +101,7 @@ def local_cluster(
         "options": {
             **listening,
             "nthreads": 1,
-            "memory_limit": memory_limit,
+            "memory_limit": memory_limit or share_of_memory(number),
             "local_directory": None if scratch is None else str(scratch),
             "silence_logs": logging.CRITICAL,
         },
@@ -109,7 +111,7 @@ def local_cluster(
         with signals_blocked():
             cluster = SpecCluster(
                 scheduler={"cls": _calm_scheduler(patience), "options": listening},
-                workers=dict.fromkeys(range(workers or usable_cores()), worker),
+                workers=dict.fromkeys(range(number), worker),
                 silence_logs=logging.CRITICAL,
             )
         try:

@@ -7,15 +7,19 @@ import shlex
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
+from pathlib import Path
 from threading import Event
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import dask
 import psutil
 import pytest
 from dask.utils import parse_timedelta
 
+from chimera_hpc.base.memory import usable_memory
+from chimera_hpc.run import choice
 from chimera_hpc.run import local_cluster as cluster
 from chimera_hpc.run.local_cluster import local_cluster, settings
 from chimera_hpc.run.slurm.workers import worker_settings
@@ -113,6 +117,40 @@ def test_workers_in_other_jobs_get_the_settings_of_their_kind() -> None:
     script = "\n".join([*worker_settings(), f"exec {sys.executable} -c {shlex.quote(asked)}"])
     shell = subprocess.run(["sh"], input=script, capture_output=True, text=True, check=True)
     assert shell.stdout.strip() == str(list(ours.values()))
+
+
+def test_workers_share_the_memory_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("distributed.SpecCluster", Recorded)
+    monkeypatch.setattr("distributed.Client", FakeClient)
+    for given, expected in ((None, usable_memory() // 3), ("2GiB", "2GiB")):
+        with local_cluster(3, memory_limit=given):
+            limits = [one["options"]["memory_limit"] for one in Recorded.workers.values()]
+            assert limits == [expected] * 3
+
+
+class Recorded:
+    """A cluster that starts nothing and notes its workers."""
+
+    workers: ClassVar[dict[int, Any]] = {}
+
+    def __init__(self, workers: dict[int, Any], **options: Any) -> None:
+        Recorded.workers = workers
+
+    def close(self, timeout: float) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("workers", "n_lines"), [(3, 1), (2, 0), (0, 0)])
+def test_more_workers_than_cores_are_warned_of(
+    workers: int, n_lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choice, "usable_cores", lambda: 2)
+    monkeypatch.setattr(choice, "local_cluster", lambda *_, **__: nullcontext("a client"))
+    said: list[str] = []
+    with choice.ExecutorChoice("local", workers).cluster(tmp_path, 9, said.append, 60.0) as found:
+        assert found[0] == "a client"
+    assert len(said) == n_lines
+    assert all("3 workers share 2 cores" in line and "--workers 2" in line for line in said)
 
 
 class FakeClient:
