@@ -92,6 +92,19 @@ def middle_height(tree: Floats, n_clusters: int) -> float:
     return 0.5 * float(heights[-1 - undone] + heights[-undone])
 
 
+def relative_gap(tree: Floats, n_clusters: int) -> float:
+    """Return ``1 - h_below / h_above`` of the merges just below and above a cut; 1 for one cluster.
+
+    The cut undoes the merge at ``h_above`` and keeps the one at ``h_below``. If the two heights are
+    nearly equal, a small change of the points exchanges them, and another cluster splits.
+    """
+    undone = min(n_clusters, separable(tree)) - 1
+    if undone < 1:
+        return 1.0
+    heights = np.concatenate([[0.0], tree[:, 2]])
+    return 1.0 - float(heights[-1 - undone] / heights[-undone])
+
+
 @dataclass(frozen=True)
 class Split:
     """A split as the depth threshold decreases: at `depth`, a cluster of class `name` splits."""

@@ -5,6 +5,7 @@ Paper figs. 5, 6, 14, 20 and others.
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from chimera_hpc.plot import style
@@ -23,7 +24,8 @@ def classification_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     cut = tree.cuts[n_clusters]
     figure = style.new_figure(style.PAGE + 1.5, 2.9)
     axes = list(figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15)))
-    draw_dendrogram(axes[0], tree.linkage, cut.labels[tree.members], cut.names, cut.depth)
+    leaf_labels, n_runs = cut.labels[tree.members], int(np.count_nonzero(cut.labels >= 0))
+    draw_dendrogram(axes[0], tree.linkage, leaf_labels, cut.names, cut.depth, n_runs)
     draw_projection(axes[1], data.triplets, cut.labels, cut.names)
     style.letter(axes)
     draw_modal_classes(axes[2], data.axes, classes, data.votes(n_clusters))

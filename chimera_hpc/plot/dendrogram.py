@@ -22,7 +22,8 @@ def dendrogram_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     tree, cut = data.classification, data.classification.cuts[n_clusters]
     if len(tree.members) < 2:
         return None
-    return dendrogram(tree.linkage, cut.labels[tree.members], cut.names, cut.depth)
+    n_runs = int(np.count_nonzero(cut.labels >= 0))
+    return dendrogram(tree.linkage, cut.labels[tree.members], cut.names, cut.depth, n_runs)
 
 
 @style.styled
@@ -31,10 +32,11 @@ def dendrogram(
     leaf_labels: NDArray[np.int64],
     names: Sequence[str],
     depth: float,
+    n_runs: int = 0,
 ) -> Figure:
     """Draw the tree of m leaves with its classes coloured; arguments as in `draw_dendrogram`."""
     figure, (axes,) = style.new_panels(1, style.COLUMN + 0.6, 2.9)
-    draw_dendrogram(axes, linkage, leaf_labels, names, depth)
+    draw_dendrogram(axes, linkage, leaf_labels, names, depth, n_runs)
     style.add_class_legend(figure, names)
     return figure
 
@@ -45,10 +47,12 @@ def draw_dendrogram(
     leaf_labels: NDArray[np.int64],
     names: Sequence[str],
     depth: float,
+    n_runs: int = 0,
 ) -> None:
     """Draw every merge as a bracket, in its class's colour below the cut, and the cut as a line.
 
-    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line.
+    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line;
+    n_runs is the number of runs if the leaves are a sample of them.
     """
     segments, owner = brackets(linkage, leaf_labels)
     for label in range(-1, len(names)):
@@ -64,7 +68,8 @@ def draw_dendrogram(
     axes.set_xlim(-0.01 * n_places - 0.5, 1.01 * n_places - 0.5)
     axes.set_ylim(0.0, 1.05 * top)
     axes.set_xticks([])
-    axes.set_xlabel(f"{len(leaf_labels)} runs", labelpad=6.0)
+    sample = f"sample of {len(leaf_labels)} of " if n_runs > len(leaf_labels) else ""
+    axes.set_xlabel(f"{sample}{n_runs or len(leaf_labels)} runs", labelpad=6.0)
     axes.set_ylabel("depth $d$ (scaled units)")
     # Beside the panel's letter: at the line itself it would cover branches.
     axes.set_title(f"cut at $d$ = {depth:.3g}", loc="right", fontsize="medium")

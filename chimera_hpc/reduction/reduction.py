@@ -26,6 +26,7 @@ from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
 from chimera_hpc.reduction.selection import check_selections
+from chimera_hpc.reduction.stability import tree_warnings
 from chimera_hpc.reduction.table import class_table
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import write_reduction
@@ -154,9 +155,8 @@ class _Work:
         self.results = build_results(
             store.sweep, store.points, self.ledger, made, self.curves, claims, self.quality
         )
-        self.results["warnings"] = caveats(store.sweep) + quality_warnings(
-            store.sweep, self.status, self.scalars, self.quality, made.cuts
-        )
+        measured = quality_warnings(store.sweep, self.status, self.scalars, self.quality, made.cuts)
+        self.results["warnings"] = [*caveats(store.sweep), *measured, *tree_warnings(made)]
         self.curves = self.results["curves"]
         audit, line = kept_audit(self.place, self._basis)
         self.results |= audit

@@ -192,7 +192,7 @@ _SCALING = """![Seconds against workers, points, nodes and P](images/scaling.png
 
 _REDUCTION = """## Reduction at scale
 
-Ward's tree is grown in linear memory beyond 4,000 oscillating runs; beyond 50,000 (10,000 with
+Ward's tree is grown in linear memory beyond 4,000 oscillating runs; beyond 100,000 (10,000 with
 average or complete linkage) it grows over a sample without chance that covers every region of
 the triplets, and the others take the class of their nearest sampled run. Triplets of the plane
 sweep, resampled:"""

@@ -87,6 +87,12 @@ def test_middle_heights_by_hand() -> None:
     assert tree.middle_height(grown, 1) == pytest.approx(1.05 * 10.5)
 
 
+def test_relative_gaps_by_hand() -> None:
+    grown = tree.grow(LINE, "average")  # merges at 1, 2 and 10.5
+    gaps = [tree.relative_gap(grown, k) for k in (1, 2, 3, 4, 9)]
+    assert gaps == pytest.approx([1.0, 1.0 - 2.0 / 10.5, 0.5, 1.0, 1.0])
+
+
 def test_splits_below_name_the_class_that_parts() -> None:
     grown = tree.grow(LINE, "average")
     labels = tree.cut(grown, 2)

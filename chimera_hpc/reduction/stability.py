@@ -1,0 +1,43 @@
+"""How far the classes of a tree can be relied on: trees of a sample, cuts between equal merges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chimera_hpc.classify.classification import Classification
+from chimera_hpc.classify.tree import relative_gap
+
+CLOSE_MERGES = 0.02
+"""Relative gap of two merge heights below which a cut between them is called unstable."""
+
+
+def tree_warnings(made: Classification) -> list[str]:
+    """Return a line if the tree holds a sample only, and one for each cut that is unstable."""
+    return [*_of_sample(made), *_of_cuts(made)]
+
+
+def runs_with_class(made: Classification) -> int:
+    """Return the number of runs that have a class, in the tree or by their nearest leaf."""
+    return int(np.count_nonzero(made.base.labels >= 0))
+
+
+def _of_sample(made: Classification) -> Iterator[str]:
+    if made.sampled:
+        yield (
+            f"the tree holds a sample of {len(made.members)} of {runs_with_class(made)} runs, and "
+            f"each other run has the class of the nearest run in it: classes of the full tree "
+            f"may differ, in cuts of many clusters most"
+        )
+
+
+def _of_cuts(made: Classification) -> Iterator[str]:
+    for asked, cut in made.cuts.items():
+        gap = relative_gap(made.linkage, len(cut.names))
+        if gap < CLOSE_MERGES:
+            yield (
+                f"the cut into {asked} clusters is unstable: the merges above and below it differ "
+                f"by {100 * gap:.2g} % in height (below {CLOSE_MERGES:.0%}), so other seeds may "
+                f"split another class; a cut of fewer or more clusters may be firmer"
+            )
