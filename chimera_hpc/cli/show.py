@@ -64,8 +64,8 @@ def execute(args: Namespace) -> int:
     store = Store.open(path)
     chosen = find_points(store, args.point)
     node = store.sweep.features.reference_node if args.node is None else args.node
-    if not 0 <= node < store.sweep.n_nodes:
-        raise BadInput(f"--node {node}: allowed is 0 to {store.sweep.n_nodes - 1}")
+    if not 0 <= node < store.sweep.n_observed:
+        raise BadInput(f"--node {node}: allowed is 0 to {store.sweep.n_observed - 1}")
     _one_cell(store, chosen)
     from chimera_hpc.plot.animation import check_film
     from chimera_hpc.reduction.replay import replay, representative

@@ -35,15 +35,15 @@ def point_seconds(sweep: Sweep) -> float:
     instead of 2 N0; the estimate assumes P = N0 / 4, the middle of the range of P.
     """
     tolerance: float = max(1.0, (1e-3 / sweep.integrator.rtol) ** 0.2)
-    variables = (1 + sweep.n_nodes / 4) / 2 if sweep.integrator.form == "full" else 1.0
-    nodes_time = sweep.n_nodes * sweep.integrator.t_end
+    variables = (1 + sweep.n_observed / 4) / 2 if sweep.integrator.form == "full" else 1.0
+    nodes_time = sweep.n_observed * sweep.integrator.t_end
     return _NODE_TIME_SECONDS * nodes_time * tolerance * variables
 
 
 def series_bytes(sweep: Sweep) -> float:
     """Return the bytes of series that the store keeps per point, averaged over the seeds."""
     share = {"all": 1.0, "none": 0.0, "first-seed": 1 / len(sweep.seeds)}
-    n_bytes = sweep.n_samples * sweep.n_nodes * _SERIES_BYTES[sweep.keep.dtype]
+    n_bytes = sweep.n_samples * sweep.n_observed * _SERIES_BYTES[sweep.keep.dtype]
     return share[sweep.keep.series] * n_bytes
 
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job import registry
-from chimera_hpc.job.networks import kind_parameters, on_network
+from chimera_hpc.job.networks import distinct, groups_of, on_network
 from chimera_hpc.job.user_models import Origin, prints_to_stderr, user_model, user_source
 from chimera_hpc.models.parameters import ModelParameters
 from chimera_hpc.models.protocol import BuiltIn, Model, ModelKind
@@ -52,6 +50,9 @@ def parameters_of(
     kind = model_kind(name, origin)
     if network is not None and not getattr(kind, "on_network", None):
         raise BadInput(f"network: {short(name)} gets no network{_how(name)}")
+    known = getattr(kind, "signals", ("nodes",))
+    if network is not None and network.signals not in known:
+        raise BadInput(f'network.signals: "{network.signals}": {short(name)} knows {known[0]} only')
     return on_network(kind.parameters, network) if _general(kind, network) else kind.parameters
 
 
@@ -96,15 +97,17 @@ def try_networks(sweep: Sweep) -> None:
     pairs that variations need.
     """
     assert sweep.network is not None
-    points = sweep.points()
-    names = [p.name for p in kind_parameters(sweep.network.kind)]
-    table = np.stack([points.columns[name].astype(np.float64) for name in names])
-    _, first = np.unique(table, axis=1, return_index=True)
-    for i in np.sort(first)[:MOST_TRIED].tolist():
+    points, names = sweep.points(), distinct(sweep.network.kind)
+    first, _ = groups_of(points.columns, names)
+    for i in sorted(first)[:MOST_TRIED]:
         row = points.row(i)
         try:
-            build(sweep, row)
-            pairs_of(sweep, row)
+            size = build(sweep, row).n_nodes
+            pairs = pairs_of(sweep, row)
+            if pairs is not None and not len(pairs):
+                raise BadInput("no two of its signals are neighbours, so nothing varies")
+            if size < max(sweep.features.groups, sweep.features.reference_node + 1):
+                raise BadInput(f"{size} {sweep.signals} are less than features.groups or its node")
         except BadInput as error:
             place = ", ".join(f"{name} = {row[name]}" for name in names)
             raise BadInput(f"network with {place}: {error}") from None

@@ -5,13 +5,25 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, StringConstraints, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    StringConstraints,
+    ValidationInfo,
+    model_validator,
+)
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.job.networks import KINDS, RING
+from chimera_hpc.job.networks import KINDS
 from chimera_hpc.job.table import Line, Table
-from chimera_hpc.network.sweep_network import read_file
+from chimera_hpc.network.complex import SIGNALS
+from chimera_hpc.network.sweep_network import RING, read_file
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _known_kind(value: str) -> str:
@@ -36,11 +48,14 @@ class NetworkTable(Table):
     triangles: Literal["none", "cliques"] = Field(
         "none", description="Triangles of the network: none, or all triples of linked nodes."
     )
+    signals: Literal["nodes", "links", "triangles"] = Field(
+        "nodes", description="Where the observed signal u lives."
+    )
     digest: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{16}$")] | None = Field(
         None, description="Digest of the file, which the plan fills in."
     )
-    nodes: int | None = Field(
-        None, ge=1, description="Number of nodes in the file, which the plan fills in."
+    sizes: Annotated[tuple[int, int, int] | None, BeforeValidator(_as_tuple)] = Field(
+        None, description="Nodes, links and triangles of the file, which the plan fills in."
     )
 
     @model_validator(mode="before")
@@ -55,15 +70,29 @@ class NetworkTable(Table):
         path = next((place for place in places if place.is_file()), places[0]).absolute()
         try:
             network, digest = read_file(path)
+            if given.get("triangles", "none") == "cliques":
+                network = network.with_triangles("cliques")
         except BadInput as error:
             raise BadInput(f"network.file: {error}") from None
-        return {**given, "file": str(path), "digest": digest, "nodes": network.n_nodes}
+        return {
+            **given,
+            "file": str(path),
+            "digest": digest,
+            "sizes": tuple(map(network.size, SIGNALS)),
+        }
 
     @model_validator(mode="after")
     def _check_file(self) -> Self:
         if (self.kind == "file") != (self.file is not None):
             raise BadInput('network.file: needed with kind = "file", and only with that')
+        if self.signals == "triangles" and self.triangles == "none":
+            raise BadInput('network.signals: "triangles" needs triangles = "cliques"')
         return self
+
+    @property
+    def nodes(self) -> int | None:
+        """Number of nodes in the file."""
+        return None if self.sizes is None else self.sizes[0]
 
     @property
     def spec(self) -> dict[str, Any]:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from chimera_hpc.base.errors import BadInput
-from chimera_hpc.models.parameters import RING_LIMIT, Limit, ModelParameters, Parameter
-from chimera_hpc.models.topological_fhn import PARAMETERS as ON_THE_RING
-from chimera_hpc.network.sweep_network import RING, RING_PARAMETERS
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["KINDS", "NETWORK_SEED", "RING", "check_sizes", "kind_parameters", "on_network"]
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.models.parameters import RING_LIMIT, Column, Limit, ModelParameters, Parameter
+from chimera_hpc.models.topological_fhn import PARAMETERS as ON_THE_RING
+from chimera_hpc.network.complex import SIGNALS
+from chimera_hpc.network.sweep_network import RING, RING_PARAMETERS, network_of
 
 if TYPE_CHECKING:
     from chimera_hpc.job.network_table import NetworkTable
+    from chimera_hpc.job.spec import Sweep
 
 NETWORK_SEED = Parameter(
     "network_seed",
@@ -61,6 +64,8 @@ _LIMITS = {
     ),
     "modules": Limit("modules", (), lambda _, n: n, "a group has at least one node"),
 }
+_TURNS = ("Q", "orientation", "flips", "flip_set")
+"""Parameters that turn links and leave their number."""
 _DIVISORS = {"columns": "n_nodes / columns rows", "layers": "layers of equal size"}
 
 
@@ -105,6 +110,38 @@ def _limits(kind: str) -> tuple[Limit, ...]:
 
 def _of_ring(limit: Limit) -> bool:
     return bool({limit.name, *limit.needs} & set(RING_PARAMETERS))
+
+
+def observed_sizes(sweep: Sweep, columns: Mapping[str, Column]) -> NDArray[np.int64]:
+    """Return the number of nodes, links or triangles that have a signal, for each point.
+
+    Networks are made once for each combination of the parameters that decide the size.
+    """
+    table, n_points = sweep.network, len(columns["seed"])
+    if table is None or table.signals == "nodes":
+        return np.full(n_points, sweep.n_nodes)
+    if table.sizes is not None:
+        return np.full(n_points, table.sizes[SIGNALS.index(table.signals)])
+    names = [name for name in distinct(table.kind) if name not in _TURNS]
+    first, of_point = groups_of(columns, names)
+    plain = dict.fromkeys(_TURNS, 0) | {"orientation": 1}
+    rows = [{name: column[i].item() for name, column in columns.items()} | plain for i in first]
+    sizes = [network_of(sweep, row).size(table.signals) for row in rows]
+    return np.array(sizes)[of_point]
+
+
+def distinct(kind: str) -> list[str]:
+    """Return the names of the parameters in which the networks of a kind differ."""
+    return [p.name for p in kind_parameters(kind)]
+
+
+def groups_of(
+    columns: Mapping[str, Column], names: Sequence[str]
+) -> tuple[list[int], NDArray[np.int64]]:
+    """Return the first point of each combination of these columns, and that of each point."""
+    table = np.stack([columns[name].astype(np.float64) for name in names])
+    _, first, number = np.unique(table, axis=1, return_index=True, return_inverse=True)
+    return first.tolist(), number.ravel()
 
 
 def check_sizes(kind: str, n_nodes: int, values: Mapping[str, Any]) -> None:

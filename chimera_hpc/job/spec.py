@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     Field,
     PrivateAttr,
@@ -39,7 +40,7 @@ from chimera_hpc.job.checks import (
 )
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.network_table import NetworkTable
-from chimera_hpc.job.networks import check_sizes
+from chimera_hpc.job.networks import check_sizes, observed_sizes
 from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
 from chimera_hpc.job.points import DTYPES, Points, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
@@ -163,6 +164,20 @@ class Sweep(Table):
         return parameters_of(self.model, self._origin, self.network)
 
     @property
+    def signals(self) -> str:
+        """Where the observed signal u lives: "nodes", "links" or "triangles"."""
+        return "nodes" if self.network is None else self.network.signals
+
+    @cached_property
+    def n_observed(self) -> int:
+        """Most nodes, links or triangles with a signal u of one point: the width of its arrays."""
+        return self.n_nodes if self.signals == "nodes" else int(self.observed(self.points()).max())
+
+    def observed(self, points: Points) -> NDArray[np.int64]:
+        """Return how many nodes, links or triangles have a signal u, for each point."""
+        return observed_sizes(self, points.columns)
+
+    @property
     def pairs(self) -> str:
         """Over which pairs of nodes variations are taken: "ring", "links" or "order"."""
         return self.measures.pairs or ("ring" if self.network is None else "links")
@@ -282,6 +297,8 @@ class Sweep(Table):
         if self.network is not None:
             check_sizes(self.network.kind, self.n_nodes, _values({**single, **axes}))
             check_network_choices(self.reduction.analyses)
+            if self.signals != "nodes" and self.pairs != "links":
+                raise BadInput(f'measures.pairs: "{self.pairs}" is for signals = "nodes"')
         own = model if ":" in self.model or self.network is not None else None
         check_names("reduction.show", self.reduction.show, own)
         check_names("reduction.replay", self.reduction.replay, own)

@@ -67,6 +67,8 @@ class BuiltIn:
     parameters: ModelParameters
     builder: Callable[[Any, Row], Model] | None = None
     on_network: Callable[[Network, Any, Row], Model] | None = None
+    signals: tuple[str, ...] = ("nodes",)
+    """Where u may live: "nodes", "links", "triangles"."""
 
     def build(self, sweep: Any, row: Row) -> Model:
         """Return the model of one point, from its row of columns."""

@@ -140,4 +140,4 @@ PARAMETERS = ModelParameters(
     ),
 )
 
-MODEL = BuiltIn(PARAMETERS, on_network=_on_network)
+MODEL = BuiltIn(PARAMETERS, on_network=_on_network, signals=SIGNALS)

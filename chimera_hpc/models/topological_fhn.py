@@ -20,7 +20,7 @@ from chimera_hpc.models.parameters import (
     ring_size,
 )
 from chimera_hpc.models.protocol import BuiltIn, Row
-from chimera_hpc.network.complex import dimension
+from chimera_hpc.network.complex import SIGNALS, dimension
 from chimera_hpc.network.network import Network
 from chimera_hpc.network.sweep_network import ring_of
 
@@ -284,4 +284,4 @@ PARAMETERS = ModelParameters(
     forms=("reduced", "full"),
 )
 
-MODEL = BuiltIn(PARAMETERS, _build, _on_network)
+MODEL = BuiltIn(PARAMETERS, _build, _on_network, SIGNALS)

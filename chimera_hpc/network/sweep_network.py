@@ -22,6 +22,7 @@ from chimera_hpc.base.streams import (
     topology_stream,
 )
 from chimera_hpc.network.checks import Integers
+from chimera_hpc.network.complex import SIGNALS
 from chimera_hpc.network.network import Network
 
 Numbers = Mapping[str, int | float]
@@ -50,9 +51,10 @@ def network_of(sweep: Any, row: Numbers) -> Network:
 
 
 def pairs_of(sweep: Any, row: Numbers) -> Integers | None:
-    """Return the pairs of nodes over which a point's variations are taken, shape (M, 2).
+    """Return the pairs over which a point's variations are taken, shape (M, 2).
 
-    None stands for a node and the next around the ring.
+    None stands for a node and the next around the ring. With u on links or triangles, a pair
+    shares a node or a link.
 
     Raises
     ------
@@ -62,9 +64,19 @@ def pairs_of(sweep: Any, row: Numbers) -> Integers | None:
     if sweep.pairs == RING:
         return None
     network = network_of(sweep, row)
-    if sweep.pairs == "links":
-        return network.links
-    return _chain(network)
+    if sweep.pairs == "order":
+        return _chain(network)
+    return network.links if sweep.signals == "nodes" else _sharing(network, sweep.signals)
+
+
+@lru_cache(maxsize=64)
+def _sharing(network: Network, signals: str) -> Integers:
+    """Return the pairs of links that share a node, or of triangles that share a link."""
+    from scipy.sparse import triu
+
+    sides = abs(network.with_weights(None).boundary(SIGNALS.index(signals)))
+    common = triu(sides.T @ sides, 1, format="coo")
+    return np.column_stack([common.row, common.col]).astype(np.int64)
 
 
 @lru_cache(maxsize=64)

@@ -87,7 +87,7 @@ def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
             u=signals[row][0],
             w=signals[row][1],
             status=Status(int(made.status[row])),
-            features=made.features[row],
+            features=made.features[row, :, : signals[row][0].shape[1]],
             triplet=made.scalars[row, : len(TRIPLET)],
             n_windows=int(made.n_windows[row]),
             digest=int(found[row]),

@@ -124,7 +124,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
 
 
 def _figures(content: Content, n_branches: int) -> dict[str, figure]:
-    n_nodes = content.store.sweep.n_nodes
+    n_nodes = content.store.sweep.n_observed
     made = charts.sources()
     height = float(content.classification.linkage[:, 2].max(initial=0.0)) or 1.0
     figures = {charts.MAP: charts.cell_map(made, axis_labels(content))}

@@ -153,7 +153,7 @@ def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array
         missing = batch[~kept[batch]]
         replayed = dict(zip(missing.tolist(), _replay(content, missing), strict=True))
         for i in batch.tolist():
-            yield t, replayed[i].T if i in replayed else store.node_series(i)
+            yield t, replayed[i].T[: store.size(i)] if i in replayed else store.node_series(i)
 
 
 def _replay(content: Content, points: NDArray[np.int64]) -> Array:
@@ -178,7 +178,7 @@ def _profiles_of(content: Content, points: NDArray[np.int64]) -> dict[int, Array
         if i // size != block:
             block = i // size
             table = content.store.files.read("features", block)
-        row = np.array(table[i % size], dtype=np.float64)
+        row = np.array(table[i % size][:, : content.store.size(i)], dtype=np.float64)
         found[i] = row if np.isfinite(row[: len(_PROFILES)]).all() else None
     return found
 

@@ -137,9 +137,9 @@ class _Block:
         self.keeps = series_mask(sweep, points.columns["seed"])
         self.result = empty_result(sweep, n)
         # Of the run being measured: u as stored, u and w node by node.
-        shape = (sweep.n_nodes, len(times))
-        self.stored = np.empty(shape[::-1], dtype=sweep.keep.dtype)
+        shape = (sweep.n_observed, len(times))
         self.u, self.w = np.empty(shape), np.empty(shape)
+        self.stored: NDArray[Any] | None = None
 
     def integrate(
         self,
@@ -195,19 +195,29 @@ class _Block:
             return
         with foreign_code():
             u, w = model.node_pair(outcome.samples)
-        stored = self.stored
-        if result.series is not None and self.keeps[row]:
-            stored = result.series[row]
-        signal, u = u, store_as(u, stored, self.u)
-        if stored is not self.stored and (reason := _misfit(signal, stored)):
-            raise DoesNotFit(f"{self.place(row)}: {reason}")
-        w = by_node(w, self.w)
+        kept = result.series[row] if result.series is not None and self.keeps[row] else None
+        stored = self.room_for(model.n_nodes, kept)
+        signal, u = u, store_as(u, stored, self.u[: model.n_nodes])
+        if kept is not None:
+            if reason := _misfit(signal, stored):
+                raise DoesNotFit(f"{self.place(row)}: {reason}")
+            if stored is not kept:
+                kept[:, : model.n_nodes] = stored
+        w = by_node(w, self.w[: model.n_nodes])
         features = self.features(u)
         result.status[row] = features.status
         result.n_windows[row] = features.n_windows
-        result.features[row] = features.as_array()
+        result.features[row, :, : model.n_nodes] = features.as_array()
         result.quality[row] = quality(features, self.sweep.integrator.t_step)
         result.scalars[row] = self.scalars(row, features, u.T, w.T, outcome.y_end)
+
+    def room_for(self, size: int, kept: NDArray[Any] | None) -> NDArray[Any]:
+        """Return an array (T, size) for u as it is stored: that of the result if it fits."""
+        if kept is not None and size == kept.shape[1]:
+            return kept
+        if self.stored is None or size != self.stored.shape[1]:
+            self.stored = np.empty((len(self.times), size), dtype=self.sweep.keep.dtype)
+        return self.stored
 
     def place(self, row: int) -> str:
         """Return the point in words: ``P=3 seed=7``."""

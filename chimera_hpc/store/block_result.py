@@ -53,11 +53,11 @@ def empty_result(sweep: Sweep, n: int) -> BlockResult:
     series = None
     if sweep.keep.series != "none":
         missing = MISSING if sweep.keep.dtype == "int16" else np.nan
-        shape = (n, sweep.n_samples, sweep.n_nodes)
+        shape = (n, sweep.n_samples, sweep.n_observed)
         series = np.full(shape, missing, dtype=sweep.keep.dtype)
     return BlockResult(
         status=np.full(n, int(Status.NEVER), dtype=np.int64),
-        features=np.full((n, len(FEATURES), sweep.n_nodes), np.nan),
+        features=np.full((n, len(FEATURES), sweep.n_observed), np.nan),
         scalars=np.full((n, len(scalar_labels(sweep))), np.nan),
         quality=np.full((n, len(QUALITY)), np.nan),
         steps=np.zeros(n, dtype=np.int64),

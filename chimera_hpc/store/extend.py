@@ -106,6 +106,8 @@ def check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> Non
     changed = [name for name in SAME_TABLES if getattr(sweep, name) != getattr(before, name)]
     if sweep.n_nodes != before.n_nodes:
         changed.append("fixed.n_nodes")
+    elif sweep.n_observed != before.n_observed:
+        changed.append(f"the largest number of {sweep.signals}")
     if changed:
         raise BadInput(f"{path}: an extension may change axes only, not {', '.join(changed)}")
     new = sweep.points()

@@ -32,9 +32,11 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     -------
     xarray.Dataset
         Features are ``amplitude(point, node)`` and so on, scalars ``V_theta(point)``, the ledger's
-        fields ``status(point)``; all NaN where a point has no result. Coordinates are the
-        parameters and `cell`, the number of the point's combination of all parameters but the
-        seed: ``set_index(point=["cell", "seed"]).unstack()`` makes them dimensions. For each cut k
+        fields ``status(point)``; all NaN where a point has no result. With u on links or triangles,
+        that dimension is called ``link`` or ``triangle``; the coordinate `size` tells how many a
+        point has, and what is beyond is NaN. Coordinates are the parameters and `cell`, the number
+        of the point's combination of all parameters but the seed:
+        ``set_index(point=["cell", "seed"]).unstack()`` makes them dimensions. For each cut k
         of the reduction, ``class_k(point)`` is the class of a run and ``modal_class_k(point)`` that
         of its cell, as texts, empty where there is none. `u` and features are read when used. The
         attribute `units` of each variable is its unit.
@@ -68,6 +70,9 @@ def open_sweep(path: str | Path) -> xr.Dataset:
         tables["quality"] = store.quality()
     dataset: xr.Dataset = stored.drop_vars(["features", *tables])
     dataset = dataset.assign_coords(cell=("point", store.points.cells()[0], _attributes("cell")))
+    if store.sweep.signals != "nodes":
+        size = (store.sizes, _attributes(f"number of {store.sweep.signals}"))
+        dataset = dataset.assign_coords(size=("point", *size))
     features = stored["features"]
     never = ledger["status"] == Status.NEVER
     if never.any():

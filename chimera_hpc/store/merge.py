@@ -142,6 +142,8 @@ def _check_alike(first: Store, other: Store) -> None:
     differ = [t for t in SAME_TABLES if getattr(first.sweep, t) != getattr(other.sweep, t)]
     if first.sweep.n_nodes != other.sweep.n_nodes:
         differ.append("fixed.n_nodes")
+    elif first.sweep.n_observed != other.sweep.n_observed:
+        differ.append(f"the largest number of {first.sweep.signals}")
     if differ:
         raise BadInput(
             f"{other.path}: differs from {first.path} in {', '.join(differ)}; "

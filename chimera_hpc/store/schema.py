@@ -150,7 +150,7 @@ def block_plans(
         return ArrayPlan(name, dimensions, shape, chunks, dtype, fill, attributes)
 
     scalars = scalar_labels(sweep)
-    node = ("node", sweep.n_nodes)
+    node = (sweep.signals.removesuffix("s"), sweep.n_observed)
     tables = [
         plan(
             "features",

@@ -288,7 +288,9 @@ class Store:
     # Reading
 
     def features(self) -> NDArray[np.float64]:
-        """Return the features, shape (n_points, 8, n_nodes); NaN where a point never ran.
+        """Return the features, shape (n_points, 8, n_observed); NaN where a point never ran.
+
+        NaN, too, beyond the links or triangles that a point has, if another one has more.
 
         Raises DamagedChunk rather than give NaN for what was there.
         """
@@ -310,6 +312,15 @@ class Store:
         table = gather(self.files, "quality", self.scan())
         return {label: table[:, k] for k, label in enumerate(QUALITY)}
 
+    @cached_property
+    def sizes(self) -> NDArray[np.int64]:
+        """How many nodes, links or triangles with a signal each point has, shape (n_points,)."""
+        return self.sweep.observed(self.points)
+
+    def size(self, i: int) -> int:
+        """Return how many nodes, links or triangles with a signal point i has."""
+        return self.sweep.n_nodes if self.sweep.signals == "nodes" else int(self.sizes[i])
+
     def series(self, i: int) -> NDArray[np.float64]:
         """Return u of point i over the analysis interval, shape (times, nodes).
 
@@ -317,7 +328,7 @@ class Store:
         """
         i = range(self.n_points)[i]
         self._check_series(i)
-        return read_series(self.files, i)
+        return read_series(self.files, i)[:, : self.size(i)]
 
     def node_series(self, i: int) -> StoredSeries:
         """Return u of point i node by node, read from the disk as it is asked for.
@@ -327,7 +338,7 @@ class Store:
         i = range(self.n_points)[i]
         self._check_series(i)
         check_has_run(self.files, i)
-        return StoredSeries(self.files, i)
+        return StoredSeries(self.files, i, self.size(i))
 
     def _check_series(self, i: int) -> None:
         if not series_mask(self.sweep, self.points.columns["seed"][i : i + 1]).all():

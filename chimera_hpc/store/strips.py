@@ -36,6 +36,8 @@ class StoredSeries:
     files : BlockFiles
     point : int
         A point whose series is kept, and that has been run.
+    size : int, optional
+        Nodes that the point has; default: as many as fit.
 
     Raises
     ------
@@ -43,13 +45,13 @@ class StoredSeries:
         The chunk is missing or damaged; its checksum is verified here.
     """
 
-    def __init__(self, files: BlockFiles, point: int) -> None:
+    def __init__(self, files: BlockFiles, point: int, size: int | None = None) -> None:
         self._block, row = divmod(point, files.shapes["u"][0])
         damage = files.look("u", self._block)
         if damage:
             raise DamagedChunk(damage)
         _, n_times, n_nodes = files.shapes["u"]
-        self.shape = (n_nodes, n_times)
+        self.shape = (n_nodes if size is None else size, n_times)
         self._type = np.dtype(files.series_dtype)
         self._path: Path = files.file("u", self._block)
         self._buffer = self._open(files.place_of_series(self._block, row))

@@ -24,6 +24,7 @@ from chimera_hpc.job.networks import KINDS
 from chimera_hpc.network.sweep_network import MAKERS, NAMES, network_of, pairs_of
 from chimera_hpc.run.block import run_block
 from chimera_hpc.run.initial_state import initial_state
+from chimera_hpc.store.schema import MISSING
 
 SMALL: dict[str, Mapping[str, Any]] = {
     "lattice": {"columns": [1, 4]},
@@ -243,9 +244,78 @@ def test_no_chain_joins_the_parts_of_a_network() -> None:
         pairs_of(sweep, sweep.points().row(0))
 
 
+def on(signals: str, **changes: Any) -> dict[str, Any]:
+    table = {"kind": "small_world", "triangles": "cliques", "signals": signals}
+    grid = {"P": [2, 3], "rewire": 0.0, "seeds": 2}
+    short = {"integrator": {"t_end": 40.0}, "features": {"start": 20.0}}
+    return job(network=table, grid=grid, **short, **changes)
+
+
+@pytest.mark.parametrize(("signals", "sizes"), [("links", (24, 36)), ("triangles", (12, 36))])
+def test_arrays_are_as_wide_as_the_largest_network(signals: str, sizes: tuple[int, int]) -> None:
+    sweep = Sweep.from_dict(on(signals))
+    points = sweep.points()
+    assert sweep.observed(points).tolist() == np.repeat(sizes, 2).tolist()
+    assert sweep.n_observed == max(sizes)
+    made = run_block(sweep, points)
+    for i, size in enumerate(np.repeat(sizes, 2).tolist()):
+        assert made.series is not None
+        assert (made.series[i][:, :size] != MISSING).all()
+        assert (made.series[i][:, size:] == MISSING).all()
+        assert np.isnan(made.features[i][:, size:]).all()
+    small = Sweep.from_dict(on(signals) | {"grid": {"P": 2, "rewire": 0.0, "seeds": 2}})
+    alone = run_block(small, small.points())
+    assert small.n_observed == sizes[0]
+    np.testing.assert_array_equal(alone.scalars, made.scalars[:2])
+    np.testing.assert_array_equal(alone.features, made.features[:2, :, : sizes[0]])
+    np.testing.assert_array_equal(alone.series, made.series[:2, :, : sizes[0]])
+
+
+def test_neighbours_of_a_link_share_a_node_and_those_of_a_triangle_a_link() -> None:
+    for signals, part in (("links", "links"), ("triangles", "triangles")):
+        sweep = Sweep.from_dict(on(signals))
+        row = sweep.points().row(0)
+        nodes = [set(one) for one in getattr(network_of(sweep, row), part).tolist()]
+        shared = 1 if signals == "links" else 2
+        expected = {
+            (i, j)
+            for j in range(len(nodes))
+            for i in range(j)
+            if len(nodes[i] & nodes[j]) == shared
+        }
+        found = pairs_of(sweep, row)
+        assert found is not None
+        assert set(map(tuple, found.tolist())) == expected
+        assert len(found) == len(expected)
+
+
+def test_the_size_of_a_file_is_known_without_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    club = networkx.node_link_data(networkx.karate_club_graph(), edges="links")
+    path.write_text(json.dumps(club))
+    table = {"kind": "file", "file": str(path), "triangles": "cliques", "signals": "triangles"}
+    data = {"name": "x", "model": "topological_fhn", "network": table}
+    spec = Sweep.from_dict(data).to_dict()
+    path.unlink()
+    stored = Sweep.from_dict(spec)
+    assert stored.network is not None
+    assert stored.network.sizes == (34, 78, 45)
+    assert stored.n_observed == 45
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"network": {"signals": "edges"}}, "network.signals = 'edges': "),
+        ({"network": {"signals": "triangles"}}, 'network.signals: "triangles" needs triangles'),
+        (
+            {"network": {"signals": "links"}, "measures": {"pairs": "order"}},
+            'measures.pairs: "order" is for signals = "nodes"',
+        ),
+        (
+            {"network": {"signals": "links"}, "model": "networked_fhn"},
+            "network",
+        ),
         ({"network": {"kind": "smallworld"}}, "network.kind: 'smallworld' is unknown; did you"),
         ({"network": {"size": 3}}, "network.size: unknown key"),
         ({"network": {"kind": "file"}}, 'network.file: needed with kind = "file", and only with'),
