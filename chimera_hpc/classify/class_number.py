@@ -122,7 +122,8 @@ def _far_from_others(scaled: Floats) -> NDArray[np.bool_]:
     members = max(3, int(np.ceil(SMALLEST * len(scaled))))
     if len(scaled) <= 2 * members:
         return np.zeros(len(scaled), dtype=np.bool_)
-    reach = cKDTree(scaled).query(scaled, k=members)[0][:, -1]
+    distances: Floats = np.asarray(cKDTree(scaled).query(scaled, k=members)[0])
+    reach = distances[:, -1]
     far: NDArray[np.bool_] = reach > _FAR * max(float(np.quantile(reach, 0.9)), 1e-9)
     few = np.count_nonzero(far) <= 2 * members
     return far if few else np.zeros_like(far)
