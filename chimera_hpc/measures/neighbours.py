@@ -12,7 +12,7 @@ from chimera_hpc.base.errors import BadInput
 Integers = NDArray[np.int64]
 
 
-class Neighbours(NamedTuple):
+class NeighbourTable(NamedTuple):
     """Node i has the neighbours ``indices[indptr[i] : indptr[i + 1]]``."""
 
     indptr: Integers
@@ -26,7 +26,7 @@ class Neighbours(NamedTuple):
         return np.diff(self.indptr)
 
 
-def neighbours(pairs: str | ArrayLike, n_nodes: int) -> Neighbours:
+def neighbours(pairs: str | ArrayLike, n_nodes: int) -> NeighbourTable:
     """Return the neighbours of N nodes.
 
     Parameters
@@ -50,7 +50,9 @@ def neighbours(pairs: str | ArrayLike, n_nodes: int) -> Neighbours:
     both = np.concatenate([joined, joined[:, ::-1]])
     both = both[np.lexsort((both[:, 1], both[:, 0]))]
     counts = np.bincount(both[:, 0], minlength=n_nodes)
-    return Neighbours(np.concatenate([[0], np.cumsum(counts)]), np.ascontiguousarray(both[:, 1]))
+    return NeighbourTable(
+        np.concatenate([[0], np.cumsum(counts)]), np.ascontiguousarray(both[:, 1])
+    )
 
 
 def _ring(n_nodes: int) -> Integers:

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures.checks import Array, floats, node_rows
-from chimera_hpc.measures.neighbours import Neighbours, neighbours
+from chimera_hpc.measures.neighbours import NeighbourTable, neighbours
 
 # Unit vectors that a chunk of times holds, so that they stay in the second-level cache.
 _VECTORS = 8192
@@ -132,7 +132,7 @@ class RunOrders(NamedTuple):
     """Time mean of R_k around each node, (N,)."""
 
 
-def run_orders(u: ArrayLike, w: ArrayLike, around: Neighbours | None = None) -> RunOrders:
+def run_orders(u: ArrayLike, w: ArrayLike, around: NeighbourTable | None = None) -> RunOrders:
     """Order parameters of a run u, w (T, N), in one pass without a phase.
 
     As `order_parameter` and `local_order` of `phase_angles.phases`, "geometric". Neighbours are
