@@ -58,15 +58,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if missing and os.environ.get(f"REQUIRE_{name}") != "1":
             _skip(items, marker, f"no {name} on this machine: {', '.join(missing)} not found")
 
-    if config.pluginmanager.hasplugin("xdist"):
-        for item in items:
-            item.add_marker(pytest.mark.xdist_group(_group(item)))
-
-
-def _group(item: pytest.Item) -> str:
-    """Return what one process does in turn: a file, for its fixtures, or all tests of SLURM."""
-    return "slurm" if item.get_closest_marker("slurm") else item.nodeid.partition("::")[0]
-
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     for marker, (name, programs) in _NEEDS.items():
