@@ -24,7 +24,7 @@ the run itself, so a smooth wave has g0 < 1. A field without any curvature has g
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,9 +37,19 @@ from chimera_hpc.measures.neighbours import neighbours
 # Largest curvature, as a share of the range of u, that rounding alone gives.
 _NOISE = 1e-9
 _CHUNK = 512
+_DELTA = 0.01
 
 
-def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = 0.01) -> Array:
+class _Field(NamedTuple):
+    """A run: real and imaginary part, or u alone if it is real."""
+
+    parts: Array
+    """(1 or 2, N, T)"""
+    noise: float
+    """Largest curvature or distance that counts as none."""
+
+
+def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = _DELTA) -> Array:
     """Spatial correlation of a run at each time, shape (T,).
 
     Parameters
@@ -57,14 +67,25 @@ def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = 0.01) -> Ar
     BadInput
         A wrong shape, values that are not finite, or an option that is not allowed.
     """
-    parts = _parts(u)
     _check_delta(delta)
+    return _g0(_field(u), pairs, delta)
+
+
+def run_correlations(u: ArrayLike, pairs: str | ArrayLike) -> tuple[Array, Array, float]:
+    """Return g0 (T,) over pairs of neighbours and over all pairs, and h0, of a run u (T, N)."""
+    field = _field(u)
+    h = _h0(field, _DELTA, relative=True) if field.parts.shape[1] > 1 else math.nan
+    return _g0(field, pairs, _DELTA), _g0(field, "global", _DELTA), h
+
+
+def _g0(field: _Field, pairs: str | ArrayLike, delta: float) -> Array:
+    parts, noise = field
     n_nodes, n_times = parts.shape[1:]
     found = np.zeros(n_times)
     if isinstance(pairs, str) and pairs == "global":
         n_pairs = n_nodes * (n_nodes - 1) // 2
         largest = _farthest(parts)
-        if n_pairs == 0 or largest <= _noise(parts):
+        if n_pairs == 0 or largest <= noise:
             return np.ones(n_times)
         _count_pairs(parts, delta * largest, np.empty((4, _CHUNK)), found)
         correlation: Array = np.sqrt(found / n_pairs)
@@ -72,7 +93,7 @@ def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = 0.01) -> Ar
     around = neighbours(pairs, n_nodes)
     work = np.empty((4, _CHUNK))
     largest = _curvature(parts, *around, math.inf, work, found)
-    if largest <= _noise(parts):
+    if largest <= noise:
         return np.ones(n_times)
     found[:] = 0
     _curvature(parts, *around, delta * largest, work, found)
@@ -80,7 +101,7 @@ def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = 0.01) -> Ar
     return share
 
 
-def h0(u: ArrayLike, delta: float = 0.01, *, relative: bool = True) -> float:
+def h0(u: ArrayLike, delta: float = _DELTA, *, relative: bool = True) -> float:
     """Temporal correlation h0 of a run.
 
     Parameters
@@ -102,11 +123,16 @@ def h0(u: ArrayLike, delta: float = 0.01, *, relative: bool = True) -> float:
     BadInput
         As `g0`; or fewer than two nodes.
     """
-    parts = _parts(u)
+    field = _field(u)
     _check_delta(delta)
-    n_nodes = parts.shape[1]
-    if n_nodes < 2:
+    if field.parts.shape[1] < 2:
         raise BadInput("h0 needs at least two nodes")
+    return _h0(field, delta, relative)
+
+
+def _h0(field: _Field, delta: float, relative: bool) -> float:
+    parts = field.parts
+    n_nodes = parts.shape[1]
     rho = _correlations(parts)[np.triu_indices(n_nodes, 1)]
     largest = float(rho.max()) if relative else 1.0
     # Rounding may leave the |rho| of equal signals below 1.
@@ -114,25 +140,22 @@ def h0(u: ArrayLike, delta: float = 0.01, *, relative: bool = True) -> float:
     return math.sqrt(np.count_nonzero(close) / rho.size) if largest > 0 else 0.0
 
 
-def _parts(u: ArrayLike) -> Array:
-    """Return real and imaginary part of u (T, N), or u alone if it is real, as (1 or 2, N, T)."""
+def _field(u: ArrayLike) -> _Field:
+    """Return u (T, N), checked."""
     values = np.asarray(u)
     if values.dtype.kind == "c":
         parts = np.stack([node_rows("u", part) for part in (values.real, values.imag)])
     else:
         parts = node_rows("u", u)[None]
-    if not np.isfinite(parts.min() + parts.max()):
+    low, high = parts.min(axis=(1, 2)), parts.max(axis=(1, 2))
+    if not np.isfinite(low + high).all():
         raise BadInput("u must be finite")
-    return parts
+    return _Field(parts, _NOISE * float((high - low).max()))
 
 
 def _check_delta(delta: float) -> None:
     if not 0.0 < delta <= 1.0:
         raise BadInput(f"delta must be in (0, 1], not {delta}")
-
-
-def _noise(parts: Array) -> float:
-    return _NOISE * float((parts.max(axis=(1, 2)) - parts.min(axis=(1, 2))).max())
 
 
 def _farthest(parts: Array) -> float:
@@ -152,7 +175,7 @@ def _correlations(parts: Array) -> NDArray[np.float64]:
     for start in range(0, n_times, _CHUNK):
         centred = parts[:, :, start : start + _CHUNK] - mean
         z = centred[0] if len(parts) == 1 else centred[0] + 1j * centred[1]
-        product += z @ z.conj().T
+        product += z @ (z.T if len(parts) == 1 else z.conj().T)
     size: NDArray[np.float64] = np.abs(product)
     length = np.sqrt(np.diag(size))
     still = length <= 1e-15 * max(-parts.min(), parts.max()) * math.sqrt(n_times)

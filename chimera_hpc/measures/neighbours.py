@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -42,10 +43,16 @@ def neighbours(pairs: str | ArrayLike, n_nodes: int) -> NeighbourTable:
     BadInput
         Another word, a wrong shape, a node outside 0 .. N-1, or a pair of a node with itself.
     """
-    joined = _ring(n_nodes) if isinstance(pairs, str) and pairs == "ring" else _given(pairs)
+    if isinstance(pairs, str) and pairs == "ring":
+        return _ring(n_nodes)
+    joined = _given(pairs)
     outside = (joined < 0) | (joined >= n_nodes)
     if outside.any():
         raise BadInput(f"pairs: node {joined[outside][0]}: allowed is 0 to {n_nodes - 1}")
+    return _table(joined, n_nodes)
+
+
+def _table(joined: Integers, n_nodes: int) -> NeighbourTable:
     joined = np.unique(np.sort(joined, axis=1), axis=0)
     both = np.concatenate([joined, joined[:, ::-1]])
     both = both[np.lexsort((both[:, 1], both[:, 0]))]
@@ -55,9 +62,11 @@ def neighbours(pairs: str | ArrayLike, n_nodes: int) -> NeighbourTable:
     )
 
 
-def _ring(n_nodes: int) -> Integers:
+# Every run of a sweep asks for it.
+@lru_cache(maxsize=8)
+def _ring(n_nodes: int) -> NeighbourTable:
     i = np.arange(n_nodes if n_nodes > 1 else 0)
-    return np.stack([i, (i + 1) % n_nodes], axis=1)
+    return _table(np.stack([i, (i + 1) % n_nodes], axis=1), n_nodes)
 
 
 def _given(pairs: str | ArrayLike) -> Integers:

@@ -35,10 +35,10 @@ def _communities(run: MeasuredRun) -> Sequence[float]:
 
 
 def _correlations(run: MeasuredRun) -> Sequence[float]:
-    from chimera_hpc.measures.correlations import g0, h0
+    from chimera_hpc.measures.correlations import run_correlations
 
-    space = g0(run.u, _pairs(run))
-    return float(space.mean()), float(space.std()), float(g0(run.u, "global").mean()), h0(run.u)
+    near, all_pairs, time = run_correlations(run.u, _pairs(run))
+    return float(near.mean()), float(near.std()), float(all_pairs.mean()), time
 
 
 def _velocity(run: MeasuredRun) -> Sequence[float]:
