@@ -101,6 +101,24 @@ def test_phases_without_a_network_are_on_the_papers_ring():
     assert models[0].phase_lag == 1.4
 
 
+def test_phases_live_on_the_links_of_a_job_that_says_so():
+    job = Sweep.from_dict(
+        {
+            "name": "x",
+            "model": "simplicial_kuramoto",
+            "network": {"kind": "small_world", "triangles": "cliques", "signals": "links"},
+            "grid": {"coupling": [0.5], "seeds": 2},
+            "fixed": {"n_nodes": 12, "P": 2, "omega": 6.0, "explosive": 1},
+            "integrator": {"t_end": 20.0, "t_step": 0.05, "delta": 3.0},
+            "features": {"start": 10.0, "n_peaks": 3, "n_overlap": 1, "groups": 2},
+        }
+    )
+    model: Any = build(job, job.points().row(0))
+    assert (model.order, model.n_nodes, model.explosive) == (1, 24, True)
+    result = run_block(job, job.points())
+    assert set(result.status.tolist()) <= {int(Status.DONE), int(Status.STEADY)}
+
+
 def test_simplicial_model_takes_no_weights():
     job = {
         "name": "x",
