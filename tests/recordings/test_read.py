@@ -30,6 +30,13 @@ def test_npy_has_no_times_and_rows_are_times(tmp_path: Path):
     assert read(tmp_path / "u.npy", transpose=True).u.tolist() == U.T.tolist()
 
 
+def test_npz_without_times_or_with_times_left_out_has_none(tmp_path: Path):
+    np.savez(tmp_path / "u.npz", u=U)
+    assert read(tmp_path / "u.npz").t is None
+    np.savez(tmp_path / "timed.npz", u=U, time=T)
+    assert read(tmp_path / "timed.npz", no_times=True).t is None
+
+
 def test_npz_takes_the_only_matrix_and_turns_it_by_the_number_of_times(tmp_path: Path):
     np.savez(tmp_path / "u.npz", anything=U.T, time=T, note=np.array(3))
     found = read(tmp_path / "u.npz")
