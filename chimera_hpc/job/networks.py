@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +32,11 @@ _P = Parameter("P", int, None, "Links of a node to each side, of the ring it is 
 _SHARE = {"low": 0.0, "high": 1.0}
 
 KINDS: dict[str, tuple[Parameter, ...]] = {
-    RING: tuple(p for p in ON_THE_RING.parameters if p.name in RING_PARAMETERS),
+    RING: tuple(
+        replace(p, default=0) if p.name == "Q" else p
+        for p in ON_THE_RING.parameters
+        if p.name in RING_PARAMETERS
+    ),
     "lattice": (
         Parameter("columns", int, 1, "Nodes of a row; 1: one dimension.", low=1),
         Parameter("periodic", int, 1, "Whether it closes: 1 yes, 0 no.", low=0, high=1),

@@ -382,6 +382,38 @@ def test_networks_that_do_not_do_are_found_before_a_sweep_starts(tmp_path: Path)
     try_networks(Sweep.from_dict(job()))
 
 
+@pytest.mark.parametrize("kind", ["ring", "small_world"])
+def test_a_users_model_gets_the_network(kind: str, monkeypatch: Any, tmp_path: Path) -> None:
+    text = """
+from chimera_hpc import OwnModel, Parameter
+def rhs(y, dy, p, ints, network):
+    pass
+MODEL = OwnModel(rhs, variables=["x"], parameters=[Parameter("k", float, 1.0, "Strength.")],
+                 network=True)
+"""
+    (tmp_path / f"networked_{kind}.py").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    made = job(kind, model=f"networked_{kind}:MODEL", grid={"P": 2, "seeds": 1})
+    if kind == "ring":
+        del made["network"]
+    else:
+        made["grid"]["rewire"] = 0.0
+    sweep = Sweep.from_dict(made)
+    assert sweep.pairs == ("ring" if kind == "ring" else "links")
+    row = sweep.points().row(0)
+    adjacency = Network.ring(12, 2).adjacency
+    shared = build(sweep, row).int_params
+    assert shared[1:3].tolist() == [12, 0]  # n_nodes, and where the rows of CSR begin
+    assert adjacency.indices.tolist() == shared[15 : 15 + adjacency.nnz].tolist()
+
+
+def test_other_models_live_on_the_ring_without_the_table() -> None:
+    data = {"name": "x", "model": "kuramoto_sakaguchi", "grid": {"P": [2, 3]}}
+    sweep = Sweep.from_dict(data)
+    found = [network(sweep, point).digest for point in (0, 1)]
+    assert found == [Network.ring(50, 2).digest, Network.ring(50, 3).digest]
+
+
 def test_a_model_without_networks_says_so(monkeypatch: Any, tmp_path: Path) -> None:
     text = """
 from chimera_hpc import OwnModel, Parameter
