@@ -208,9 +208,11 @@ def _unit(orbits: Any, start: int, n: int, vectors: Any) -> None:
 @jit()
 def _add(vectors: Any, j: int, n: int, total: Any) -> None:
     """Add the vectors of a node to total (2, chunk)."""
+    along, across = total[0], total[1]
+    x, y = vectors[0, j], vectors[1, j]
     for i in range(n):
-        total[0, i] += vectors[0, j, i]
-        total[1, i] += vectors[1, j, i]
+        along[i] += x[i]
+        across[i] += y[i]
 
 
 @jit()
@@ -244,8 +246,9 @@ def _orders(orbits: Any, indptr: Any, indices: Any, work: Any, local: Any, sums:
 @jit()
 def _lengths(total: Any, n: int) -> None:
     """Write the lengths of n vectors total[:2] into total[2]."""
+    along, across, length = total[0], total[1], total[2]
     for i in range(n):
-        total[2, i] = np.sqrt(total[0, i] * total[0, i] + total[1, i] * total[1, i])
+        length[i] = np.sqrt(along[i] * along[i] + across[i] * across[i])
 
 
 @jit()
