@@ -36,7 +36,7 @@ from chimera_hpc.measures.neighbours import neighbours
 
 # Largest curvature, as a share of the range of u, that rounding alone gives.
 _NOISE = 1e-9
-_CHUNK = 512
+_CHUNK = 256
 _DELTA = 0.01
 
 
