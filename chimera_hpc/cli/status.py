@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.files import time_at
@@ -25,6 +26,7 @@ from chimera_hpc.store.ledger import (
     read_metadata,
     scan_ledger,
 )
+from chimera_hpc.store.runs import block_work
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +78,7 @@ def state_of(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> dict[
     numbers = np.bincount(np.clip(codes, 0, None), minlength=max(Status) + 1)
     counts = {code: int(numbers[code]) for code in Status}
     finished = (codes >= Status.DONE) & (codes <= Status.NO_WINDOW)
-    mean = scan.columns["elapsed_us"][finished].mean() / 1e6 if finished.any() else None
+    mean = seconds_per_point(path, scan.columns["elapsed_us"][finished])
     running = len(live_claims(path))
     rate = recent_rate(path, scan, block_size) if running else None
     return {
@@ -95,6 +97,18 @@ def state_of(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> dict[
         "points_a_second": rate,
         "seconds_left": counts[Status.NEVER] / rate if rate else None,
     }
+
+
+def seconds_per_point(path: Path, integration_us: NDArray[np.int64]) -> float | None:
+    """Return the work of one core per point, by the blocks of all runs; None if unknown.
+
+    For runs that did not record it, such as those of version 0.1, it is the mean of the points'
+    own times (``integration_us``), which count the integration only.
+    """
+    work = block_work(path)
+    if work.points > 0:
+        return work.seconds / work.points
+    return float(integration_us.mean()) / 1e6 if len(integration_us) else None
 
 
 def recent_rate(path: Path, scan: LedgerScan, block_size: int) -> float | None:

@@ -38,6 +38,11 @@ class ExecutorChoice:
     """Which share of the blocks, of how many: block i belongs to share i modulo their number."""
 
     @property
+    def n_workers(self) -> int:
+        """Number of processes that compute blocks at a time; 1 if it is not known before."""
+        return (self.workers or usable_cores()) if self.kind == "local" else 1
+
+    @property
     def compiles_here(self) -> bool:
         """Whether this machine compiles the kernels: nodes of SLURM may be of another type."""
         return self.kind not in ("slurm", "allocation")

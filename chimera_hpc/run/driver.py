@@ -22,6 +22,7 @@ from chimera_hpc.run.watchdog import watchdog
 from chimera_hpc.store.claims import live_claims
 from chimera_hpc.store.ledger import RESULTS, unfinished
 from chimera_hpc.store.provenance import differences, gather
+from chimera_hpc.store.runs import BlockWork
 
 if TYPE_CHECKING:
     from chimera_hpc.run.choice import ExecutorChoice
@@ -36,6 +37,8 @@ _LONGEST_WAIT = 10.0
 _FIRST_RUN = "CHIMERA_HPC_FIRST_RUN"
 """Environment variable of a process that goes on for another one: the number of that one's run."""
 _RUNS_COMPARED = 20
+_RECORD_SECONDS = 30.0
+"""What is known of the work is written this often: a run that is killed leaves it."""
 
 
 class Refreshing(Protocol):
@@ -64,6 +67,8 @@ class Driver:
         """Blocks that were left for a later run, and why."""
         self._errors: Counter[int] = Counter()
         self._machines: list[str] = []
+        self._work_done = BlockWork(0, 0.0)
+        self._recorded = 0.0
         self._late = False
         self._refused: str | None = None
         self.report: Refreshing | None = None
@@ -79,7 +84,8 @@ class Driver:
         Raises BadInput for what only another job, or another model, can put right.
         """
         try:
-            reporter = Reporter(self.store.n_points, self.log)
+            workers = self.executor.n_workers
+            reporter = Reporter(self.store.n_points, self.log, workers=workers)
         except OSError as error:
             raise _cannot_write(self.log, error) from None
         with reporter as self.reporter, self.stop.good_order():
@@ -261,8 +267,11 @@ class Driver:
 
     def _note(self, message: RunMessage, receipt: BlockReceipt) -> None:
         """Take a receipt to the books."""
-        if receipt.machine and receipt.machine not in self._machines:
+        self._work_done += BlockWork(receipt.n_done + receipt.n_failed, receipt.seconds)
+        is_new = bool(receipt.machine) and receipt.machine not in self._machines
+        if is_new:
             self._machines.append(receipt.machine)
+        if is_new or time.monotonic() - self._recorded > _RECORD_SECONDS:
             self._record(message)
         if receipt.error is not None:
             self._note_error(receipt.block, receipt.error)
@@ -278,12 +287,14 @@ class Driver:
             self.report.refresh(self.reporter.note)
 
     def _record(self, message: RunMessage) -> None:
-        """Write next to the run's record where its points were computed, and until when."""
+        """Write next to the run's record where its points were computed, how long, until when."""
         from chimera_hpc.store.runs import record_work
 
+        self._recorded = time.monotonic()
         now = datetime.now(UTC).isoformat(timespec="seconds")
+        info = {"machines": self._machines, "until": now, **self._work_done.record()}
         try:
-            record_work(message.store, message.run, {"machines": self._machines, "until": now})
+            record_work(message.store, message.run, info)
         except OSError:
             # A disk that is full will be heard of from the blocks.
             return

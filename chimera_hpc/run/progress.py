@@ -15,17 +15,23 @@ if TYPE_CHECKING:
 
 LINE_SECONDS = 10.0
 """Plain lines come this often, and at the end."""
+_STEADY_BLOCKS = 5
+"""Blocks per worker, the first one included, after which the rate is counted by the clock."""
 
 
 class Reporter:
     """Counts points as blocks end and shows the count, the rate and the time to go."""
 
-    def __init__(self, total: int, log: Path | None = None, stream: TextIO | None = None) -> None:
-        """Count up to ``total`` points; ``log`` gets a copy of every line."""
+    def __init__(
+        self,
+        total: int,
+        log: Path | None = None,
+        stream: TextIO | None = None,
+        workers: int = 1,
+    ) -> None:
+        """Count up to ``total`` points of `workers`; ``log`` gets a copy of every line."""
         self.total, self.done, self.failed = total, 0, 0
-        self._counted = 0
-        # The clock of the rate starts with the first block: workers take a while to come up.
-        self._began: float | None = None
+        self._pace = _Pace(workers)
         self._started = self._last_line = time.monotonic()
         self._stream = stream or sys.stderr
         self._log = log.open("a", encoding="utf-8") if log is not None else None
@@ -41,7 +47,6 @@ class Reporter:
                 Progress,
                 TextColumn,
                 TimeElapsedColumn,
-                TimeRemainingColumn,
             )
 
             self._bar = Progress(
@@ -49,13 +54,14 @@ class Reporter:
                 BarColumn(),
                 MofNCompleteColumn(),
                 TextColumn("{task.fields[rate]}"),
-                TextColumn("ETA"),
-                TimeRemainingColumn(),
+                TextColumn("ETA {task.fields[left]}"),
                 TextColumn("elapsed"),
                 TimeElapsedColumn(),
                 console=Console(file=self._stream),
             )
-            self._task = self._bar.add_task("points", total=self.total, completed=0, rate="")
+            self._task = self._bar.add_task(
+                "points", total=self.total, completed=0, rate="", left="-"
+            )
             self._bar.start()
         return self
 
@@ -105,22 +111,44 @@ class Reporter:
     def add(self, n_done: int, n_failed: int, seconds: float = 0.0) -> None:
         """Count the points of a block that has ended after `seconds` of work."""
         now = time.monotonic()
-        if self._began is None:
-            self._began = now - seconds
         self.done += n_done + n_failed
         self.failed += n_failed
-        self._counted += n_done + n_failed
-        rate = self._counted / max(now - self._began, 1e-9)
+        rate = self._pace.add(n_done + n_failed, seconds, now)
+        left = duration(max(0, self.total - self.done) / rate) if rate else "-"
         if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=self.done, rate=f"{rate:.1f}/s")
-        elif (self._counted and now - self._last_line > LINE_SECONDS) or self.done >= self.total:
+            self._bar.update(self._task, completed=self.done, rate=f"{rate:.1f}/s", left=left)
+        elif (rate and now - self._last_line > LINE_SECONDS) or self.done >= self.total:
             self._last_line = now
-            left = max(0, self.total - self.done) / max(rate, 1e-9)
             failures = f", {self.failed} failed" if self.failed else ""
             self.say(
                 f"{self.done} of {self.total} points{failures}, {rate:.1f} points/s, "
-                f"elapsed {duration(now - self._started)}, ETA {duration(left)}"
+                f"elapsed {duration(now - self._started)}, ETA {left}"
             )
+
+
+class _Pace:
+    """The rate at which points come, from the blocks that have ended.
+
+    The first block of each worker takes longer, because the worker loads its kernels. It counts
+    only until there are others. As long as these are few, most work is in blocks that have not
+    ended; the rate is then that of one worker times the number of workers.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._workers, self._ended = workers, 0
+        self._points, self._work, self._began = 0, 0.0, 0.0
+
+    def add(self, points: int, seconds: float, now: float) -> float:
+        """Count a block that ended `now`; return points per second, 0 if none is known yet."""
+        self._ended += 1
+        if self._ended == self._workers + 1:
+            self._points, self._work = 0, 0.0
+        self._points, self._work = self._points + points, self._work + seconds
+        if self._ended == self._workers:
+            self._began = now
+        if self._ended > _STEADY_BLOCKS * self._workers:
+            return self._points / max(now - self._began, 1e-9)
+        return self._workers * self._points / max(self._work, 1e-9)
 
 
 def duration(seconds: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,35 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import create_exclusively, write_atomically
 
 FOLDER = "runs"
+
+
+@dataclass(frozen=True)
+class BlockWork:
+    """Points of blocks that have ended, and the wall time that these blocks took, summed.
+
+    The time includes measuring and writing. With one core per worker, it is work of one core.
+    """
+
+    points: int
+    seconds: float
+
+    def __add__(self, other: BlockWork) -> BlockWork:
+        return BlockWork(self.points + other.points, self.seconds + other.seconds)
+
+    def record(self) -> dict[str, Any]:
+        """Return the keys of `record_work` that hold it."""
+        return {"points": self.points, "core_seconds": round(self.seconds, 3)}
+
+
+def block_work(path: Path) -> BlockWork:
+    """Return the work of all runs that have recorded it; version 0.1 did not."""
+    found = BlockWork(0, 0.0)
+    for number in run_numbers(path):
+        work = read_work(path, number)
+        points, seconds = work.get("points"), work.get("core_seconds")
+        if isinstance(points, int) and isinstance(seconds, int | float):
+            found += BlockWork(points, float(seconds))
+    return found
 
 
 def start_run(path: Path, info: Mapping[str, Any]) -> int:

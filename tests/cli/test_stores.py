@@ -468,6 +468,17 @@ def test_status_counts_points_blocks_and_time(finished: Path, sweep: Run) -> Non
     assert (state["points"], state["done"], state["pending"]) == (15, 7, 8)
     assert (state["blocks"], state["blocks_written"], state["blocks_damaged"]) == (4, 2, 1)
     assert state["core_seconds_left"] > 0
+    record = finished / "store.zarr" / "runs" / "1.work.json"
+    work = json.loads(record.read_text())
+    assert work["points"] == 15
+    assert state["seconds_a_point"] == pytest.approx(work["core_seconds"] / 15)
+    # Measuring and writing take their time, too.
+    ledger = Store.open(finished / "store.zarr").ledger()
+    assert state["seconds_a_point"] > ledger["elapsed_us"].sum() / 7 / 1e6
+    # Version 0.1 left no such record: the points' own times are taken.
+    record.write_text("{}")
+    old = json.loads(sweep("status", finished, "--json")[1])
+    assert old["seconds_a_point"] == pytest.approx(ledger["elapsed_us"].sum() / 7 / 1e6)
     code, out, _ = sweep("status", finished)
     assert "7 of 15 points done (46.7 %)" in out
 

@@ -50,10 +50,31 @@ def test_no_time_to_go_is_told_before_any_point_is_done(monkeypatch: pytest.Monk
     with Reporter(8, stream=stream) as reporter:
         for n_done in (0, 4):
             now += 20.0
-            reporter.add(n_done, 0)
+            reporter.add(n_done, 0, seconds=20.0)
     assert stream.getvalue().splitlines() == [
         "4 of 8 points, 0.2 points/s, elapsed 00:00:40, ETA 00:00:20"
     ]
+
+
+@pytest.mark.parametrize(("workers", "load"), [(1, 5.0), (4, 5.0), (16, 0.0)])
+@pytest.mark.parametrize("block", [2.0, 30.0])
+def test_rate_is_that_of_all_workers_from_the_first_blocks_on(
+    workers: int, load: float, block: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Workers do blocks of 10 points, out of step, and load something before their first one.
+    begun = [(0.1 + 0.9 * k / workers) * block for k in range(workers)]
+    ends = sorted(
+        (begin + load + (k + 1) * block, block + load * (k == 0))
+        for begin in begun
+        for k in range(20)
+    )
+    true = workers * 10 / block
+    pace = progress._Pace(workers)
+    rates = [pace.add(10, seconds, now) for now, seconds in ends]
+    assert min(rates[:workers]) == pytest.approx(true * block / (block + load))
+    assert rates[workers : 5 * workers] == pytest.approx([true] * (4 * workers))
+    # By the clock: up to one block per worker is under way.
+    assert rates[5 * workers : -workers] == pytest.approx([true] * (14 * workers), rel=0.3)
 
 
 def test_durations_have_days_when_they_need_them() -> None:
