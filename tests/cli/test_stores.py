@@ -411,6 +411,34 @@ def test_netcdf_holds_what_the_store_does(
         assert "u" not in dataset
 
 
+def test_netcdf_3_written_in_pieces_holds_the_same(
+    finished: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("chimera_hpc.reduction.export._NETCDF_4", ())
+    for name, size in (("whole.nc", 10**9), ("pieces.nc", 10)):
+        monkeypatch.setattr("chimera_hpc.reduction.export._SLICE_BYTES", size)
+        assert sweep("export", finished, "--to", tmp_path / name, "--series")[0] == 0
+    with (
+        xr.open_dataset(tmp_path / "whole.nc") as whole,
+        xr.open_dataset(tmp_path / "pieces.nc") as pieces,
+        xr.open_dataset(tmp_path / "pieces.nc", mask_and_scale=False) as packed,
+    ):
+        xr.testing.assert_identical(whole, pieces)
+        assert set(pieces.coords) == set(chimera_hpc.open(finished).coords)
+        assert "chimera" in pieces["class_3"]
+        assert packed["u"].dtype == np.int16
+        assert packed["u"].attrs["_FillValue"].dtype == np.int16
+
+
+def test_table_written_in_pieces_is_the_same(
+    finished: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, rows in (("whole.csv", 100), ("pieces.csv", 4)):
+        monkeypatch.setattr("chimera_hpc.reduction.export._SLICE_ROWS", rows)
+        assert sweep("export", finished, "--to", tmp_path / name)[0] == 0
+    assert (tmp_path / "pieces.csv").read_text() == (tmp_path / "whole.csv").read_text()
+
+
 def test_seeds_of_64_bits_are_exported_with_all_their_bits(tmp_path: Path, sweep: Run) -> None:
     for seeds in ([3, 2**31 + 1, 2**53 - 1], [0, 2**53 + 1, 2**63 - 1]):
         folder = tmp_path / str(seeds[1])

@@ -17,8 +17,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import psutil
+
+if TYPE_CHECKING:
+    from chimera_hpc.store.store import Store
 
 FOLDER = Path(__file__).parent
 JOB = """
@@ -97,6 +101,7 @@ def measure(folder: Path, n_points: int) -> list[Line]:
     assert state["done"] == n_points, state
     lines.append(Line(f"status of {n_points:.0e} points: time", done.seconds, "s", 1))
     lines.append(Line(f"status of {n_points:.0e} points: memory", done.memory / MB, "MB", 1000))
+    lines.append(export_memory(folder))
     return lines
 
 
@@ -180,6 +185,34 @@ def serial_rate(folder: Path) -> float:
     assert sum(receipt.n_done for receipt in receipts) == SMALL
     shutil.rmtree(path)
     return n_blocks / seconds
+
+
+def export_memory(folder: Path, n_seeds: int = 54) -> Line:
+    """Return the memory of an export with series; points are 0.5 MB each."""
+    store = series_store(folder / "series", n_seeds)
+    megabytes = store.n_points * store.sweep.n_samples * store.sweep.n_nodes * 2 / MB
+    words = ("export", store.path.parent, "--series", "--to", folder / "series.nc")
+    done = run("-m", "chimera_hpc.sweep", *words)
+    shutil.rmtree(store.path)
+    return Line(f"export of {megabytes:.0f} MB of series: memory", done.memory / MB, "MB", 500)
+
+
+def series_store(folder: Path, n_seeds: int) -> Store:
+    """Return a store of 20 points per seed with series, none of which was computed."""
+    sys.path.insert(0, str(FOLDER))
+    import nothing
+
+    from chimera_hpc.job import Sweep
+    from chimera_hpc.store.store import Store
+
+    text = JOB.format(values=2).replace("seeds = 1000", f"seeds = {n_seeds}")
+    text = text.replace('series = "none"', 'series = "all"').replace("block = 300", "block = 60")
+    store = Store.plan(folder / "store.zarr", Sweep.from_toml_text(text))
+    for block in range(store.n_blocks):
+        first, last = store.block(block)
+        result = nothing.nothing(store.sweep, store.points[first:last])
+        store.write_block(block, result, 1, 1)
+    return store
 
 
 def scheduler_memory(folder: Path, path: Path) -> int:

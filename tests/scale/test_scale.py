@@ -80,6 +80,15 @@ def test_files_are_five_per_block_and_few_others(
     assert count_files(store.path) - empty == 5 * store.n_blocks
 
 
+def test_export_of_series_takes_less_memory_than_the_series(
+    scale: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "run_block", work.run_block)  # set by the program
+    line = scale.export_memory(tmp_path, n_seeds=36)
+    assert "export of 360 MB of series" in line.what
+    assert line.good, line.words()
+
+
 def count_files(folder: Path) -> int:
     return sum(len(files) for _, _, files in os.walk(folder))
 
