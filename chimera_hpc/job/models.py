@@ -102,12 +102,16 @@ def try_networks(sweep: Sweep) -> None:
     for i in sorted(first)[:MOST_TRIED]:
         row = points.row(i)
         try:
-            size = build(sweep, row).n_nodes
+            model = build(sweep, row)
+            _ = model.lane_group, model.lane_params  # the model checks the matrices that it uses
             pairs = pairs_of(sweep, row)
             if pairs is not None and not len(pairs):
                 raise BadInput("no two of its signals are neighbours, so nothing varies")
-            if size < max(sweep.features.groups, sweep.features.reference_node + 1):
-                raise BadInput(f"{size} {sweep.signals} are less than features.groups or its node")
+            if model.n_nodes < max(sweep.features.groups, sweep.features.reference_node + 1):
+                raise BadInput(
+                    f"{model.n_nodes} {sweep.signals}: fewer than features.groups, or than "
+                    "features.reference_node counts"
+                )
         except BadInput as error:
             place = ", ".join(f"{name} = {row[name]}" for name in names)
             raise BadInput(f"network with {place}: {error}") from None

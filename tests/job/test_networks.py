@@ -376,6 +376,9 @@ def test_networks_that_do_not_do_are_found_before_a_sweep_starts(tmp_path: Path)
     networkx.write_gml(ring, path)
     with pytest.raises(BadInput, match=r"network with network_seed = 0, .*directed"):
         try_networks(Sweep.from_dict(from_file(path)))
+    path = write_edges(tmp_path, "".join(f"{i},{i + 1},{1 - i}\n" for i in range(8)))
+    with pytest.raises(BadInput, match=r"network with network_seed = 0, .* link 2 is -1\.0"):
+        try_networks(Sweep.from_dict(from_file(path)))
     loose = job("random", grid={"mean_degree": [10.0, 0.5]}, measures={"pairs": "order"})
     with pytest.raises(BadInput, match=r"network with mean_degree = 0\.5, .*components"):
         try_networks(Sweep.from_dict(loose))
