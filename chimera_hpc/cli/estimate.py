@@ -7,13 +7,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.memory import usable_memory
+from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.job import Sweep, block_size
-from chimera_hpc.job.blocks import point_seconds
+from chimera_hpc.job.blocks import point_seconds, series_bytes
 from chimera_hpc.store.schema import room
 
 MOST_FILES = 500_000
 MOST_CORE_HOURS = 100_000.0
 """Beyond these a sweep is taken for a slip of the pen."""
+LANES_PER_SAMPLE = 64
+MOST_SIDE_BY_SIDE = 96_000_000
+"""Bytes per sample of eight trajectories, and the most for which they are integrated side by side
+(``SAMPLE_BYTES`` of `integrate.lanes`, which takes a second to load)."""
+_PROCESS_BYTES, _POINT_BYTES, _MEASURED_BYTES = 190_000_000, 110, 37
+"""Measured: a worker with its kernels; per point of the sweep; per sample of a node, for u and w of
+one trajectory and their copies node by node."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +38,10 @@ class Estimate:
     bytes: int
     seconds: float
     """Work on one core."""
+    worker_bytes: int
+    """Memory of one worker, about."""
+    workers: int
+    """Local workers that `run` starts."""
 
 
 def estimate(sweep: Sweep) -> Estimate:
@@ -39,8 +52,39 @@ def estimate(sweep: Sweep) -> Estimate:
     cells = len(points.cells()[1]["delta"])
     seconds = point_seconds(sweep) * len(points)
     return Estimate(
-        *(len(points), cells, points.axes, size, need.blocks, need.files, need.bytes, seconds)
+        *(len(points), cells, points.axes, size, need.blocks, need.files, need.bytes, seconds),
+        worker_bytes=worker_bytes(sweep, len(points), size),
+        workers=sweep.run.workers or usable_cores(),
     )
+
+
+def worker_bytes(sweep: Sweep, n_points: int, block: int) -> int:
+    """Return about how many bytes a worker takes.
+
+    These are its packages and kernels, the parameters of all points, the series of a block that are
+    kept, the samples of trajectories side by side, and the buffers in which one is measured.
+    """
+    samples = sweep.n_nodes * sweep.n_samples
+    side_by_side = LANES_PER_SAMPLE * samples
+    return int(
+        _PROCESS_BYTES
+        + _POINT_BYTES * n_points
+        + block * series_bytes(sweep)
+        + (side_by_side if side_by_side <= MOST_SIDE_BY_SIDE else 0)
+        + _MEASURED_BYTES * samples
+    )
+
+
+def memory_lines(need: Estimate) -> list[str]:
+    """Return how much memory workers take, and a warning if they exceed the machine's."""
+    total, here = need.workers * need.worker_bytes, usable_memory()
+    words = f"about {in_bytes(need.worker_bytes)} per worker, {in_bytes(total)} for {need.workers}"
+    lines = [f"memory      {words}"]
+    if total > here:
+        fit = here // need.worker_bytes
+        advice = f"--workers {fit}" if fit else "a shorter analysis interval or fewer nodes"
+        lines.append(f"warning: there are {in_bytes(here)} of memory here; run with {advice}")
+    return lines
 
 
 def refuse_absurd(sweep: Sweep, need: Estimate, folder: Path, yes: bool) -> None:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.cli.arguments import add, load_job, sweep_folder
-from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, refuse_absurd
+from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, memory_lines, refuse_absurd
 from chimera_hpc.cli.run import check_drawing
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import build
@@ -38,6 +38,7 @@ def execute(args: Namespace) -> int:
     print(f"files       {need.files}")
     print(f"store       {in_bytes(need.bytes)} at most")
     print(f"work        about {in_time(need.seconds)} on one core")
+    print("\n".join(memory_lines(need)))
     refuse_absurd(sweep, need, folder, args.yes)
     return Exit.COMPLETE
 
