@@ -15,8 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.status import Status
+from chimera_hpc.cli.estimate import LANES_PER_SAMPLE, MOST_SIDE_BY_SIDE, worker_bytes
+from chimera_hpc.integrate import lanes
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.run import work
 from chimera_hpc.run.block import run_block
@@ -376,6 +379,32 @@ def test_plan_that_does_not_fit_on_the_disk_is_refused(
     code, _, err = sweep("plan", job)
     assert code == 2
     assert "may be needed, 1 kB are free" in err
+
+
+def test_plan_says_what_workers_take_and_how_many_fit(
+    job: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ("plan", job, "--set", "run.workers=3")
+    monkeypatch.setattr("chimera_hpc.cli.estimate.usable_memory", lambda: 10**9)
+    code, out, _ = sweep(*words)
+    assert code == 0
+    assert re.search(r"memory      about (19|2\d)\d MB per worker, \d+ MB for 3\n", out)
+    assert "warning" not in out
+    monkeypatch.setattr("chimera_hpc.cli.estimate.usable_memory", lambda: 5 * 10**8)
+    assert "warning: there are 500 MB of memory here; run with --workers 2" in sweep(*words)[1]
+
+
+def test_memory_of_a_worker_counts_samples_and_points() -> None:
+    assert (LANES_PER_SAMPLE, MOST_SIDE_BY_SIDE) == (8 * lanes.LANES, lanes.SAMPLE_BYTES)
+    small, wide = (
+        Sweep.from_toml_text(job_text(SMALL, {"fixed.n_nodes": n, "keep.series": "none"}))
+        for n in (50, 50_000)
+    )
+    samples = 50_000 * wide.n_samples
+    assert worker_bytes(small, 10, 1) < 3e8
+    more = worker_bytes(wide, 10, 1) - worker_bytes(small, 10, 1)
+    assert more == pytest.approx(37 * samples, rel=0.01)
+    assert worker_bytes(small, 10**7, 1) > 1e9
 
 
 def test_a_ctrl_c_that_another_package_makes_an_error_of_is_a_ctrl_c(
