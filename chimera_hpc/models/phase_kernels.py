@@ -39,9 +39,10 @@ def _waves_across(zero, y, params, at, n):
 def _waves_along(zero, y, params, at, n):
     # One trajectory, eight nodes at a time.
     for i in range(0, n, LANES):
-        sine, cosine = sin_cos(load_some(y, i, 0, n - i))
-        store_some(params, at + i, sine, n - i)
-        store_some(params, at + n + i, cosine, n - i)
+        left = min(n - i, LANES)
+        sine, cosine = sin_cos(load_some(y, i, 0, left))
+        store_some(params, at + i, sine, left)
+        store_some(params, at + n + i, cosine, left)
 
 
 @jit()

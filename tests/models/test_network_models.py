@@ -265,7 +265,7 @@ import numpy as np
 from networks_for_tests import complete, random_complex, slopes
 from chimera_hpc import *
 
-network, plain = random_complex(1, n=8), random_complex(1, n=8, weighted=False)
+network, plain = random_complex(1, n=11), random_complex(1, n=8, weighted=False)
 models = [
     TopologicalFHN(plain),
     TopologicalFHN(network, signals="links"),
