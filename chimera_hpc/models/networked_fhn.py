@@ -1,4 +1,4 @@
-"""The classical networked FitzHugh-Nagumo model on a ring (paper eq. eq:FHNnet)."""
+"""The classical networked FitzHugh-Nagumo model on a ring (paper eq. (F1))."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NetworkedFHN:
-    r"""A ring of FitzHugh-Nagumo oscillators coupled through both variables (eq. eq:FHNnet).
+    r"""A ring of FitzHugh-Nagumo oscillators coupled through both variables (eq. (F1)).
 
     .. math::
         \epsilon \dot x_i &= x_i - x_i^3/3 - y_i + \frac{\sigma}{2P} \sum_{j=i-P}^{i+P}
@@ -35,7 +35,7 @@ class NetworkedFHN:
             [b_{yx} (x_j - x_i) + b_{yy} (y_j - y_i)]
 
     with :math:`b_{xx} = b_{yy} = \cos\phi` and :math:`b_{xy} = -b_{yx} = \sin\phi`. The cost of a
-    step does not depend on P. Parameters default to those of the paper's appendix sec:compS.
+    step does not depend on P. Parameters default to those of the paper's app. F.
 
     Raises
     ------

@@ -30,7 +30,7 @@ class NetworkFHN(NetworkModel):
 
     with A the weights of the links (1 without weights), :math:`d_i = \sum_j A_{ij}`,
     :math:`b_{xx} = b_{yy} = \cos\phi` and :math:`b_{xy} = -b_{yx} = \sin\phi`. On a ring this is
-    `NetworkedFHN` (eq. eq:FHNnet), which has a kernel of its own for rings. u is x and w is y.
+    `NetworkedFHN` (eq. (F1)), which has a kernel of its own for rings. u is x and w is y.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""FitzHugh-Nagumo oscillators as topological signals on any network (paper eqs. eq:eq1a, b)."""
+"""FitzHugh-Nagumo oscillators as topological signals on any network (paper eqs. (1), b)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class TopologicalFHN:
         \epsilon \dot u = u - u^3/3 - D v, \qquad \dot v = b + c v + D^\top u.
 
     On nodes (k = 0, D = B_1), v lives on the links, and these are the paper's equations (eqs.
-    eq:eq1a, eq:eq1b). u is affected only through w = D v, and the equation of v is linear.
+    eq. (1), eq. (2)). u is affected only through w = D v, and the equation of v is linear.
     Multiplying it by D gives the exact reduced form
 
     .. math::

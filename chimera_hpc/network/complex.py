@@ -184,7 +184,7 @@ class SimplicialComplex:
         seed: int | np.random.Generator = 0,
         among: Integers | None = None,
     ) -> Self:
-        """Reverse ``count`` different links drawn uniformly (the paper's Q_r, sec:orient2).
+        """Reverse ``count`` different links drawn uniformly (the paper's Q_r, app. E).
 
         They are drawn from all links, or from the links with indices ``among``.
 

@@ -21,7 +21,7 @@ class Network(SimplicialComplex):
     r"""Nodes 0..N0-1 and oriented links, with optional weights and oriented triangles.
 
     A link is stored as (tail, head); reorienting it swaps the two. The incidence matrix B_1 has +1
-    at the head and -1 at the tail of each link (paper eq. eq:B1initial). A triangle (a, b, c) runs
+    at the head and -1 at the tail of each link (paper eq. (3)). A triangle (a, b, c) runs
     from a to b to c to a. A network does not change: every method returns a new one, and the arrays
     are read-only.
 
@@ -58,9 +58,9 @@ class Network(SimplicialComplex):
         """Ring of N0 nodes, each linked to its P neighbours on either side.
 
         Link i P + (k - 1) joins node i and node i + k (mod N0), k = 1..P, counted from 0.
-        Orientation 1 points every link clockwise, from i to i + k (fig:orient, left); its
+        Orientation 1 points every link clockwise, from i to i + k (fig. 1, left); its
         divergence is zero. Orientation 2 points it from the smaller index to the larger
-        (fig:orient:3).
+        (fig. 17).
 
         Raises
         ------
@@ -82,7 +82,7 @@ class Network(SimplicialComplex):
         """Reverse the links between ``node`` and its ``count`` nearest neighbours on either side.
 
         The paper's Q: for each k = 1..Q both the link from the node to node + k and the link from
-        node - k to the node are reversed, 2 Q links in total (fig:orient, middle and right).
+        node - k to the node are reversed, 2 Q links in total (fig. 1, middle and right).
 
         Raises
         ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,6 +15,22 @@ from chimera_hpc.plot.raster import NodeSeries
 from chimera_hpc.plot.style import drawn
 
 Array = NDArray[np.float64]
+
+
+_LINE = 30
+"""Letters that fit above a panel."""
+
+
+def folded(place: str) -> str:
+    """Return parameters, ``P = 3, seed 1``, on as many lines as they need above a panel."""
+    lines = [""]
+    for part in place.split(", "):
+        line = f"{lines[-1]}, {part}" if lines[-1] else part
+        if len(re.sub(r"\\[a-z]+|[${}\\]", "", line)) <= _LINE:
+            lines[-1] = line
+        else:
+            lines.append(part)
+    return "\n".join(filter(None, lines))
 
 
 @dataclass(frozen=True)
@@ -34,8 +51,8 @@ class DrawnRun:
 
     @property
     def title(self) -> str:
-        """Place and class, a line each."""
-        return "\n".join(filter(None, [self.place, drawn(self.class_name)]))
+        """Place and class, each on lines that fit above a panel."""
+        return "\n".join(filter(None, [folded(self.place), drawn(self.class_name)]))
 
 
 @dataclass(frozen=True)
