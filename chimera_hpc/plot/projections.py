@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import FigureInput
@@ -21,6 +21,9 @@ LABELS = (r"$V_\theta$", r"$V_a$", r"$V_\Omega$ (1/time)")
 PLANES = ((0, 1), (0, 2), (1, 2))
 _MANY = 500
 """Number of points above which a PDF holds an image of them instead of a path for each."""
+
+_CROWDED = 20_000
+"""Number of runs above which markers are small and translucent."""
 
 
 def projections_figure(data: FigureInput, n_clusters: int) -> Figure | None:
@@ -39,10 +42,10 @@ def projections(
     flat = [figure.add_subplot(grid[i // 2, i % 2]) for i in range(3)]
     for axes, plane in zip(flat, PLANES, strict=True):
         draw_projection(axes, triplets, labels, names, plane)
-    flat[0].legend(handles=style.class_handles(names), loc="best")
     solid = figure.add_subplot(grid[1, 1], projection="3d")
     _draw_solid(solid, triplets, labels, names, angle)
     style.letter([*flat, solid])
+    style.add_class_legend(figure, names)
     return figure
 
 
@@ -57,29 +60,44 @@ def draw_projection(
     """Scatter each class over one plane of (V_theta, V_a, V_Omega), not scaled."""
     x, y = plane
     points, label = np.asarray(triplets, dtype=np.float64), np.asarray(labels)
+    size, alpha = _mark(label)
     for i, name in enumerate(names):
         chosen = points[label == i]
-        kind = {"alpha": 0.75, "rasterized": len(chosen) > _MANY, **look}
-        style.scatter_class(axes, chosen[:, x], chosen[:, y], name, 11.0, **kind)
+        kind = {"alpha": alpha, "rasterized": len(chosen) > _MANY, **look}
+        style.scatter_class(axes, chosen[:, x], chosen[:, y], name, size, **kind)
     axes.set_xlabel(LABELS[x])
     axes.set_ylabel(LABELS[y])
+
+
+def _mark(labels: NDArray[Any]) -> tuple[float, float]:
+    """Return area and opacity of the markers: small and translucent if there are many runs.
+
+    Where they overlap, the shade then shows how many there are.
+    """
+    n_runs = int(np.count_nonzero(labels >= 0))
+    if n_runs <= _CROWDED:
+        return 11.0, 0.75
+    return 2.0, max(0.08, 0.5 * _CROWDED / n_runs)
 
 
 def _draw_solid(
     axes: Any, triplets: ArrayLike, labels: ArrayLike, names: Sequence[str], angle: float
 ) -> None:
     points, label = np.asarray(triplets, dtype=np.float64), np.asarray(labels)
+    size, alpha = _mark(label)
+    # Markers that are far away fade, too.
+    look = {"s": min(size, 9.0), "alpha": min(1.0, 3.0 * alpha)}
     for i, name in enumerate(names):
         x, y, z = points[label == i].T
         axes.scatter(
             x,
             y,
             z,
-            s=9.0,
             marker=style.marker_of(name),
             color=style.colour_of(name),
             linewidths=0.0,
             rasterized=len(x) > _MANY,
+            **look,
         )
     axes.set_xlabel(LABELS[0], labelpad=-4.0)
     axes.set_ylabel(LABELS[1], labelpad=-4.0)

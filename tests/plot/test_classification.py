@@ -81,6 +81,21 @@ def test_projections_show_three_planes_and_a_solid(rendered: Render) -> None:
     assert sum(len(c.get_offsets()) for c in solid.collections) == 3
 
 
+def test_many_runs_are_small_and_translucent_and_legends_cover_none(rendered: Render) -> None:
+    looks = []
+    for n in (20_000, 20_001, 100_000):
+        triplets = np.random.default_rng(0).random((n, 3))
+        figure = projections(triplets, np.arange(n) % 2, NAMES)
+        marks = figure.axes[0].collections[0]
+        looks.append((float(marks.get_sizes()[0]), marks.get_alpha()))
+        assert [axes.get_legend() for axes in figure.axes] == [None] * 4
+        assert len(figure.legends) == 1
+    assert looks[0] == (11.0, 0.75)
+    assert looks[1] == (2.0, pytest.approx(0.5, abs=1e-3))
+    assert looks[2] == (2.0, pytest.approx(0.1))
+    assert [text.get_text() for text in rendered(figure).legends[0].get_texts()] == [*NAMES]
+
+
 def test_class_against_puts_each_class_in_its_row(rendered: Render, colour_at: Any) -> None:
     classes = ["steady", "ordered", "disordered", None, "chimera"]
     figure = rendered(modal_classes([("$P = Q$", [2, 3, 4, 5, 6])], classes))

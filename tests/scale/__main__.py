@@ -102,6 +102,7 @@ def measure(folder: Path, n_points: int) -> list[Line]:
     lines.append(Line(f"status of {n_points:.0e} points: time", done.seconds, "s", 1))
     lines.append(Line(f"status of {n_points:.0e} points: memory", done.memory / MB, "MB", 1000))
     lines.append(export_memory(folder))
+    lines.append(tree_time(100_000))
     return lines
 
 
@@ -195,6 +196,14 @@ def export_memory(folder: Path, n_seeds: int = 54) -> Line:
     done = run("-m", "chimera_hpc.sweep", *words)
     shutil.rmtree(store.path)
     return Line(f"export of {megabytes:.0f} MB of series: memory", done.memory / MB, "MB", 500)
+
+
+def tree_time(n_runs: int) -> Line:
+    """Return the time of the reduction's tree of all runs, with triplets drawn at random."""
+    program = "import sys, numpy; from chimera_hpc.classify.classification import classify; "
+    program += "n = int(sys.argv[1]); draw = numpy.random.default_rng(0); "
+    program += "made = classify(draw.random((n, 3)), numpy.ones(n)); assert not made.sampled"
+    return Line(f"tree of {n_runs:.0e} runs: time", run("-c", program, n_runs).seconds, "s", 120)
 
 
 def series_store(folder: Path, n_seeds: int) -> Store:
