@@ -100,6 +100,8 @@ def _allowed(entry: Mapping[str, Any]) -> str:
         return "list of names"
     if "const" in entry:
         return f"`{json.dumps(entry['const'])}`"
+    if "prefixItems" in entry:
+        return f"list of {len(entry['prefixItems'])} numbers"
     if entry.get("type") == "array":
         return f"list of {_allowed(entry['items'])}"
     if entry.get("pattern") == ":":

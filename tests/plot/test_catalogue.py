@@ -76,7 +76,7 @@ def test_list_of_figures_draws_these_and_no_others():
 def test_numbered_figure_shows_that_cut():
     make = choose(("projections_5",), [3, 5])["projections_5"]
     data = outcome()
-    legend = make(data).axes[0].get_legend()
+    (legend,) = make(data).legends
     names = [text.get_text() for text in legend.get_texts()]
     assert names == list(data.classification.cuts[5].names)
     assert len(names) == 5
