@@ -25,6 +25,7 @@ def made_runs(votes: list[dict[str, int]]) -> Runs:
     rng = np.random.default_rng(1)
     triplets = np.array([CENTRES[name] for name in names]) + 1e-3 * rng.random((len(names), 3))
     scalars = dict(zip(("V_theta", "V_a", "V_Omega"), triplets.T, strict=True))
+    scalars["sigma_1"] = triplets[:, 0]
     return Runs(sweep, sweep.points(), np.full(len(names), int(Status.DONE)), scalars)
 
 
@@ -58,7 +59,22 @@ def test_clear_cells_keep_their_class_and_an_open_one_changes_as_often_as_its_vo
 
 def test_same_draw_gives_the_same_results(runs: Runs, tmp_path: Path) -> None:
     first, second = (RedrawnEvidence(tmp_path, {"diagonal": runs}, 5) for _ in range(2))
-    assert first.job("diagonal") == second.job("diagonal")
+    for path in ("cuts", "clustering", "curves/variations"):
+        assert first.value("diagonal", path) == second.value("diagonal", path)
+
+
+def test_results_of_a_draw_are_made_when_they_are_looked_at(runs: Runs, tmp_path: Path) -> None:
+    evidence = RedrawnEvidence(tmp_path, {"diagonal": runs}, 5)
+    made = evidence.job("diagonal")
+    assert not made["curves"]
+    evidence.value("diagonal", "curves/variations/cells")
+    assert list(made["curves"]) == ["variations"]
+    assert "cuts" not in made
+    assert len(evidence.cells("diagonal", 3)) == 4
+    assert list(made["curves"]) == ["variations"]
+    for path in ("curves/stability", "curves/no_such", "no_such"):
+        with pytest.raises(Missing, match=path):
+            evidence.value("diagonal", path)
 
 
 def test_job_that_was_not_run_is_missing(tmp_path: Path) -> None:

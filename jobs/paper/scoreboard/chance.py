@@ -56,7 +56,10 @@ class Runs:
         store = Store.open(folder / STORE_NAME)
         under = convention if convention in conventions(store.sweep) else OWN
         scalars, status = seen_under(under, store.sweep, store.scalars(), store.ledger()["status"])
-        return cls(store.sweep, store.points, status, scalars)
+        runs = cls(store.sweep, store.points, status, scalars)
+        if max(map(len, runs.cells)) == 1:
+            raise Missing(f"the job {folder.name} has one run per cell: there is nothing to draw")
+        return runs
 
     @cached_property
     def cells(self) -> list[NDArray[np.int64]]:
@@ -122,8 +125,23 @@ class RedrawnEvidence(Evidence):
             cut=next(iter(classes.cuts.values())),
             atlases={name: Atlas.of(self._redrawn(name)[1]) for name in spec.atlas},
         )
-        made = build_results(runs.sweep, runs.points, {"status": runs.status}, classes, {})
-        return made | {"curves": _Curves(given)}
+        return _Results(given)
+
+
+class _Results(dict[str, Any]):
+    """What results.json would hold, made when a rule first looks at it."""
+
+    def __init__(self, given: AnalysisInput) -> None:
+        super().__init__(curves=_Curves(given))
+        self._given = given
+
+    def __missing__(self, name: str) -> Any:
+        made = self._given
+        columns = {"status": made.status}
+        self.update(build_results(made.sweep, made.points, columns, made.classification, {}) | self)
+        if name not in self:
+            raise KeyError(name)
+        return self[name]
 
 
 class _Curves(dict[str, Any]):
