@@ -1,4 +1,4 @@
-"""Chimera states in rings of topological FitzHugh-Nagumo oscillators.
+"""Chimera states in networks of oscillators: sweeps, measures, classes.
 
 The public names are loaded when they are first used (PEP 562), so that ``import chimera_hpc`` costs
 milliseconds: the kernels compile, and scikit-learn alone takes seconds.
