@@ -138,7 +138,7 @@ def simulate(
 
     Examples
     --------
-    >>> topology = Topology.ring(n_nodes=8, half_degree=3).reorient_node(0, 3)
+    >>> topology = Network.ring(n_nodes=8, half_degree=3).reorient_node(0, 3)
     >>> simulate(topology, u0=np.zeros(8), v0=np.zeros(24), t_end=1.0, t_step=0.5).u.shape
     (3, 8)
     """

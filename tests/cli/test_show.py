@@ -63,7 +63,11 @@ def test_other_bits_than_stored_are_said_with_status_one(
     finished: Path, store: Store, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
 ):
     true = variation.total_variations
-    monkeypatch.setattr(variation, "total_variations", lambda f: [1.0 + x for x in true(f)])
+
+    def other(*given: Any, **named: Any) -> list[float]:
+        return [1.0 + x for x in true(*given, **named)]
+
+    monkeypatch.setattr(variation, "total_variations", other)
     code, out, _ = sweep("show", finished, *words(store, oscillating(store)))
     assert code == 1
     assert "NOT the same" in out
