@@ -208,6 +208,9 @@ def _is_sound(name: str, node: Any, n_points: int) -> bool:
         if node["node_type"] == "group":
             return True
         array = ArrayV3Metadata.from_dict(dict(node))
+        # Zarr lets chunks of size 0 through, and divides by it later.
+        if not all(node["chunk_grid"]["configuration"]["chunk_shape"]):
+            return False
         is_coordinate = array.dimension_names == ("point",) and "/" not in name
         return array.shape == (n_points,) if is_coordinate else True
     except Exception:

@@ -174,6 +174,18 @@ def test_array_metadata_that_contradict_the_spec_are_bad_input(store: Store) -> 
         Store.open(store.path)
 
 
+@pytest.mark.parametrize("shape", [False, [0]])
+def test_coordinates_in_chunks_of_size_0_are_bad_input(store: Store, shape: object) -> None:
+    file = store.path / "zarr.json"
+    root = json.loads(file.read_bytes())
+    node = root["consolidated_metadata"]["metadata"]["P"]
+    node["chunk_grid"]["configuration"]["chunk_shape"] = shape
+    file.write_text(json.dumps(root))
+    (store.path / "zarr.json.copy").unlink()
+    with pytest.raises(BadInput, match="the metadata of 'P' are damaged"):
+        Store.open(store.path)
+
+
 def test_damaged_coordinates_and_array_metadata_are_rewritten(store: Store) -> None:
     flip(store.path / "seed" / "c.0", 5)
     assert store.repair() == ["coordinates rewritten"]
