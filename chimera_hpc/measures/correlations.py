@@ -1,9 +1,13 @@
 r"""Correlation in space and in time of a field of oscillators: g0 and h0 (Kemeth et al. 2016).
 
 F. P. Kemeth, S. W. Haugland, L. Schmidt, I. G. Kevrekidis, K. Krischer, Chaos 26, 094815 (2016),
-doi:10.1063/1.4959804. The local curvature of node i is D_i = |sum_j (u_j - u_i)| over its
-neighbours j; on a ring this is |u_{i-1} - 2 u_i + u_{i+1}|. With D_max the largest over all nodes
-and times, and d_ij = |u_i - u_j|, d_max the largest over all pairs and times,
+doi:10.1063/1.4959804. With the local curvature D_i of node i, over its neighbours j, and the
+distance d_ij of two nodes,
+
+    D_i = | sum_j (u_j - u_i) | ,       on a ring | u_{i-1} - 2 u_i + u_{i+1} | ,
+    d_ij = | u_i - u_j | ,
+
+and D_max, d_max the largest over all nodes or pairs and times,
 
     g0(t) = share of nodes with D_i(t) < delta D_max ,
     g0(t) = sqrt( share of pairs with d_ij(t) < delta d_max )            (no geometry: "global") ,

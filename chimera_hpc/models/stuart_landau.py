@@ -40,11 +40,11 @@ class StuartLandau(NetworkModel):
     phase_lag : float
         alpha, in radians: 0 couples equal variables.
     growth : float
-        lambda: without coupling, |z| tends to its square root if it is above 0.
+        lambda: without coupling, ``|z|`` tends to its square root if it is above 0.
     omega : float or shape (N,)
         Frequencies at z = 0, in radians per unit of time.
     shear : float
-        gamma, by which the frequency falls with |z|^2.
+        gamma, by which the frequency falls with ``|z|^2``.
 
     Raises
     ------
