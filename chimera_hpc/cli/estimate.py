@@ -59,7 +59,7 @@ def estimate(sweep: Sweep) -> Estimate:
 
 
 def worker_bytes(sweep: Sweep, n_points: int, block: int) -> int:
-    """Return about how many bytes a worker takes.
+    """Estimate the memory of a worker, in bytes.
 
     These are its packages and kernels, the parameters of all points, the series of a block that are
     kept, the samples of trajectories side by side, and the buffers in which one is measured.

@@ -17,13 +17,9 @@ from pydantic import (
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.networks import KINDS
-from chimera_hpc.job.table import Line, Table
+from chimera_hpc.job.table import Line, Table, as_tuple
 from chimera_hpc.network.complex import SIGNALS
 from chimera_hpc.network.sweep_network import RING, read_file
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
 
 
 def _known_kind(value: str) -> str:
@@ -54,7 +50,7 @@ class NetworkTable(Table):
     digest: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{16}$")] | None = Field(
         None, description="Digest of the file, which the plan fills in."
     )
-    sizes: Annotated[tuple[int, int, int] | None, BeforeValidator(_as_tuple)] = Field(
+    sizes: Annotated[tuple[int, int, int] | None, BeforeValidator(as_tuple)] = Field(
         None, description="Nodes, links and triangles of the file, which the plan fills in."
     )
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
 Line = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=500)]
 """Text on one line."""
+
+
+def as_tuple(value: Any) -> Any:
+    """Convert a list (from TOML or JSON) to a tuple, because a frozen value holds no list."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 class Table(BaseModel):

@@ -28,22 +28,17 @@ from chimera_hpc.job.selection import (
     check_measures,
     check_selections,
 )
-from chimera_hpc.job.table import Line, Table
+from chimera_hpc.job.table import Line, Table, as_tuple
 from chimera_hpc.measures.conventions import PRESETS
-
-
-def _as_tuple(value: Any) -> Any:
-    """Convert a list (from TOML or JSON) to a tuple, because a frozen value holds no list."""
-    return tuple(value) if isinstance(value, list) else value
 
 
 def _as_words(value: Any) -> Any:
     """Convert one name to a tuple of one name."""
-    return (value,) if isinstance(value, str) else _as_tuple(value)
+    return (value,) if isinstance(value, str) else as_tuple(value)
 
 
 def _names(value: Any) -> Any:
-    names = _as_tuple(value)
+    names = as_tuple(value)
     if names == "triplet":
         return names
     words = isinstance(names, tuple) and all(isinstance(n, str) and n.isprintable() for n in names)
@@ -73,7 +68,7 @@ Word = Annotated[
 ]
 """A name that needs no quoting in a shell."""
 Texts = tuple[str, ...]
-Lines = Annotated[tuple[Line, ...], BeforeValidator(_as_tuple)]
+Lines = Annotated[tuple[Line, ...], BeforeValidator(as_tuple)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
 
 
@@ -209,7 +204,7 @@ class Reduction(Table):
     )
     cuts: Annotated[
         tuple[Annotated[int, Field(ge=2, le=1000)], ...],
-        BeforeValidator(_as_tuple),
+        BeforeValidator(as_tuple),
         AfterValidator(_different),
     ] = Field((3, 4, 5), description="Numbers of clusters, side by side.")
     depth: float | None = Field(
@@ -242,8 +237,8 @@ class Reduction(Table):
     beside: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
         (), description="Sweeps whose curves are drawn with this one's: folders next to this one."
     )
-    deltas: Annotated[tuple[Annotated[float, Field(ge=0)], ...], BeforeValidator(_as_tuple)] = (
-        Field((), description="Thresholds of the strength of incoherence.")
+    deltas: Annotated[tuple[Annotated[float, Field(ge=0)], ...], BeforeValidator(as_tuple)] = Field(
+        (), description="Thresholds of the strength of incoherence."
     )
     delta_unit: Literal["range", "absolute"] = Field(
         "range", description="Unit of deltas: the range of u of each run, or the unit of u."
