@@ -2,6 +2,7 @@
 # .venv with the locked packages and this package. kind=bench: .venv-bench and requirements-bench.lock.
 root=$(CDPATH='' cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
 venv=$root/.venv${kind:+-$kind} lock=$root/requirements${kind:+-$kind}.lock
+PATH=${PATH//"$venv/bin:"/} # in an active .venv, its own interpreter is no base for a new one
 python=$venv/bin/python log=$venv/setup.log stamp=$venv/.chimera-stamp # "unfinished" until all is installed
 die() { printf '%s\n' "$2" >&2; exit "$1"; }
 version() { local text; text=$("$1" -V 2>/dev/null) && echo "${text%.*}"; }

@@ -19,7 +19,6 @@ from chimera_hpc.job.together import points_of
 from chimera_hpc.job.user_models import Origin
 from chimera_hpc.store.blocks import BlockFiles, Damage
 from chimera_hpc.store.check import find_damaged, shallow_damage
-from chimera_hpc.store.claims import FOLDER as CLAIMS
 from chimera_hpc.store.claims import Claim, remove_stale
 from chimera_hpc.store.extend import check_extension, exclusive, extend, repair_metadata
 from chimera_hpc.store.ledger import (
@@ -36,9 +35,8 @@ from chimera_hpc.store.ledger import (
 )
 from chimera_hpc.store.read import check_has_run, gather, read_series
 from chimera_hpc.store.reduction import StoredReduction, Variable, read_reduction, write_reduction
-from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import start_run
-from chimera_hpc.store.schema import BLOCK_ARRAYS, OPTIONAL, QUALITY, scalar_labels, series_mask
+from chimera_hpc.store.schema import OPTIONAL, QUALITY, scalar_labels, series_mask
 from chimera_hpc.store.strips import StoredSeries
 from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
 from chimera_hpc.store.write import Receipt, write_block
@@ -247,8 +245,8 @@ class Store:
         are gone are removed, and their claims on finished blocks. Damaged blocks are not touched:
         `pending` lists them.
         """
-        folders = (self.path, *(self.path / name for name in (*BLOCK_ARRAYS, CLAIMS, RUNS)))
-        count = sum(remove_leftovers(folder) for folder in folders)
+        folders = [child for child in self.path.iterdir() if child.is_dir()]
+        count = sum(remove_leftovers(folder) for folder in (self.path, *folders))
         done = [f"{count} temporary files removed"] if count else []
         finished = set(range(self.n_blocks)) - set(self.pending())
         stale = remove_stale(self.path, finished)

@@ -17,7 +17,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job import Sweep, user_models
 from chimera_hpc.job.models import build
 from chimera_hpc.models.held import held_values
-from chimera_hpc.run.second_draw import drawn
+from chimera_hpc.run.second_draw import check_in_second_process, drawn
 from chimera_hpc.store.provenance import differences, model_source
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
@@ -353,6 +353,11 @@ def test_a_store_of_int16_goes_on_where_the_job_says_nothing(
     capsys.readouterr()
     assert main(["run", str(job), "--out", out, *SERIAL, "--set", "keep.dtype=float32"]) == 2
     assert "keep may not change" in capsys.readouterr().err
+
+
+def test_a_sweep_of_one_point_is_drawn_twice_too(tmp_path: Path) -> None:
+    job = write(tmp_path)
+    check_in_second_process(Sweep.load(job, ["seeds=1", "g=0.1"]))
 
 
 @pytest.mark.slow

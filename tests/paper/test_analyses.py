@@ -76,6 +76,14 @@ def test_reorientation_breaks_the_equilibrium() -> None:
     assert residual(plain.reorient_node(0, 1), 0.5, -0.01, np.sqrt(3.0)) == pytest.approx(100.0)
 
 
+def test_the_three_equilibria_of_a_ring_hold_and_blocks_give_their_spectra() -> None:
+    made = load(ANALYSES["stability"])(given({"P": 3, "Q": 0}, [STEADY]))
+    rows, root = made["rows"], np.sqrt(3.0)
+    assert [row["equilibrium"] for row in rows] == pytest.approx([0.0, root, -root])
+    assert max(row["residual"] for row in rows) < 1e-12
+    assert max(row["distance"] for row in rows) < 1e-9
+
+
 def test_networks_count_the_links_that_turned() -> None:
     made = load(ANALYSES["networks"])(given({"P": 3, "Q": [0, 1, 3]}, [STEADY] * 3))
     assert [panel["reoriented"] for panel in made["panels"]] == [0, 2, 6]

@@ -202,10 +202,12 @@ def test_only_left_over_temporary_files_are_removed(store: Store) -> None:
     dead = folder / f".c.0.0.0.{_mark(4194303)}.ab.partial"
     foreign = folder / ".c.0.0.0.00000000-1-1.ab.partial"
     old = folder / ".c.1.0.0.00000000-1-1.ab.partial"
-    for path in (mine, dead, foreign, old):
+    metadata = store.path / "P" / f".zarr.json.{_mark(4194303)}.ab.partial"
+    for path in (mine, dead, foreign, old, metadata):
         path.write_bytes(b"half")
     os.utime(old, (1, 1))
-    assert store.repair() == ["2 temporary files removed"]
+    assert store.repair() == ["3 temporary files removed"]
+    assert not metadata.exists()
     assert sorted(folder.glob(".*")) == sorted([mine, foreign])
 
 
