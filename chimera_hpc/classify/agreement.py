@@ -66,7 +66,22 @@ def adjusted_rand(first: Sequence[str | None], second: Sequence[str | None]) -> 
     Names do not matter, only which runs are together. Runs without a class (None) by either method
     are left out; NaN without any. Hubert, Arabie 1985, doi:10.1007/BF01908075.
     """
-    from sklearn.metrics import adjusted_rand_score
-
     both = [pair for pair in zip(first, second, strict=True) if None not in pair]
-    return float(adjusted_rand_score(*zip(*both, strict=True))) if both else float("nan")
+    if not both:
+        return float("nan")
+    return rand_index(
+        *(np.unique(side, return_inverse=True)[1] for side in zip(*both, strict=True))
+    )
+
+
+def rand_index(first: Integers, second: Integers) -> float:
+    """Adjusted Rand index of two lists of labels (n,), integers from 0."""
+    counts = np.zeros((first.max() + 1, second.max() + 1))
+    np.add.at(counts, (first, second), 1.0)
+    together, rows, columns, all_pairs = (
+        float((x * (x - 1.0)).sum())
+        for x in (counts, counts.sum(axis=1), counts.sum(axis=0), counts.sum())
+    )
+    by_chance = rows * columns / max(all_pairs, 1.0)
+    most = 0.5 * (rows + columns)
+    return (together - by_chance) / (most - by_chance) if most != by_chance else 1.0

@@ -21,8 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from chimera_hpc.classify import tree
+from chimera_hpc.classify.agreement import rand_index
 from chimera_hpc.classify.tree import Floats, Integers
 
 MOST = 8
@@ -158,15 +160,22 @@ def _gap(scaled: Floats, labels: list[Integers], rng: np.random.Generator) -> tu
 
 
 def _silhouettes(scaled: Floats, labels: list[Integers]) -> Floats:
-    from sklearn.metrics import silhouette_score
+    distances: Floats = cdist(scaled, scaled)
+    return np.array([np.nan, *(_silhouette(distances, label) for label in labels[1:])])
 
-    made = [float(silhouette_score(scaled, label)) for label in labels[1:]]
-    return np.array([np.nan, *made])
+
+def _silhouette(distances: Floats, label: Integers) -> float:
+    """Return the mean silhouette of clusters; 0 for a point that is alone."""
+    member = (label[:, None] == np.arange(label.max() + 1)).astype(np.float64)
+    sums, sizes = distances @ member, member.sum(axis=0)
+    alone = sizes[label] == 1.0
+    own = sums[member > 0.0] / np.where(alone, 1.0, sizes[label] - 1.0)
+    other = np.where(member > 0.0, np.inf, sums / sizes).min(axis=1)
+    score = np.where(alone, 0.0, (other - own) / np.maximum(np.maximum(own, other), 1e-300))
+    return float(score.mean())
 
 
 def _stability(scaled: Floats, most: int, rng: np.random.Generator) -> Floats:
-    from sklearn.metrics import adjusted_rand_score
-
     n = len(scaled)
     found = np.ones((_DRAWS, most))
     for row in found:
@@ -175,6 +184,6 @@ def _stability(scaled: Floats, most: int, rng: np.random.Generator) -> Floats:
         cuts = [_cuts(scaled[half], most) for half in halves]
         for k in range(1, most if len(both) else 0):
             first, second = (cut[k][place] for cut, place in zip(cuts, places, strict=True))
-            row[k] = adjusted_rand_score(first, second)
+            row[k] = rand_index(first, second)
     stable: Floats = found.mean(axis=0)
     return stable

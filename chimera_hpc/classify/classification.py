@@ -93,7 +93,8 @@ def classify(
     cuts : numbers of clusters. Equal points stay in one cluster, so a cut may have fewer classes
         than requested (none if no run oscillates).
     depth : depth threshold d in scaled space: merges higher than d are undone.
-    names : "triplet" or a list of names by increasing V_theta; see `naming.name_base`.
+    names : "triplet", "letters", or a list of names by increasing V_theta; see
+        `naming.name_base`.
         Finer cuts inherit the names along the tree. A class that splits gets suffixes.
     largest_tree : largest number of points in the tree (default `LARGEST_TREE`). With more points,
         the tree is built from a deterministic sample of about that size: points are sorted by box
@@ -116,7 +117,7 @@ def classify(
         A DONE point whose triplet is not finite.
     """
     _check(linkage, cuts, depth)
-    base_size = naming.base_size(names)
+    base_size = naming.base_size(names, cuts)
     points = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
     clustered = np.flatnonzero(has_triplet(points, status))
     if not np.isfinite(points[clustered]).all():
@@ -231,10 +232,11 @@ class _CutMaker:
 
     def _names(self, labels: Integers, centroids: Floats) -> tuple[list[str], list[str], Integers]:
         base_labels = self._labels(self.base_size)
-        base_names = naming.name_base(self._centroids(base_labels)[0], self.rule)
+        base_centroids, sizes = self._centroids(base_labels)
+        base_names = naming.name_base(base_centroids, self.rule, sizes)
         families = naming.inherit(base_labels, base_names, labels)
         names = naming.add_suffixes(families, centroids)
-        known = list(naming.CLASSES if isinstance(self.rule, str) else self.rule)
+        known = naming.all_names(self.rule, self.base_size)
         keys = [(known.index(family), name) for family, name in zip(families, names, strict=True)]
         order = sorted(range(len(names)), key=lambda i: (keys[i][0], len(keys[i][1]), keys[i][1]))
         return families, names, np.array(order, dtype=np.int64)

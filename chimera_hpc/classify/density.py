@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -31,7 +32,7 @@ class DensityClasses:
     labels: Integers
     """(n,) class of each value: the number of cuts below it; -1 where the value is not finite."""
     names: tuple[str, ...]
-    """(k,) ordered, chimera, disordered for three classes, else class-1, class-2, ..."""
+    """(k,) the names for three classes, else class-1, class-2, ..."""
 
 
 def bandwidth_by_rule(values: Floats) -> float:
@@ -47,14 +48,16 @@ def bandwidth_by_rule(values: Floats) -> float:
     return float(0.9 * min(spreads) * len(values) ** -0.2)
 
 
-def density_classes(values: ArrayLike, bandwidth: float | None = None) -> DensityClasses:
+def density_classes(
+    values: ArrayLike, bandwidth: float | None = None, *, names: Sequence[str] = CLASSES
+) -> DensityClasses:
     """Class values (n,) by the modes of their Gaussian kernel density estimate.
 
     f(x) = 1/(n h) sum_i phi((x - x_i)/h) on a grid of 1024 points that reaches 3 h beyond the data.
     There is one class per mode of f. The cuts are the minima of f between modes, so no threshold is
     needed. The default `bandwidth` h is Silverman's; `stable_bandwidths` gives the range with the
     same number of modes. Values that are not finite get label -1. Steady runs have sigma_l near 0
-    and should be included.
+    and should be included. Three classes have the `names`, the paper's for its model.
 
     Raises BadInput: fewer than two finite values, or a bandwidth that is not positive.
     """
@@ -70,8 +73,9 @@ def density_classes(values: ArrayLike, bandwidth: float | None = None) -> Densit
     bottoms = [left + int(density[left:right].argmin()) for left, right in pairwise(tops)]
     cuts = grid[bottoms]
     labels = np.where(finite, np.searchsorted(cuts, data), -1)
-    names = CLASSES if len(tops) == 3 else tuple(f"class-{i + 1}" for i in range(len(tops)))
-    return DensityClasses(h, grid, density, grid[tops], cuts, labels, names)
+    numbered = tuple(f"class-{i + 1}" for i in range(len(tops)))
+    called = tuple(names) if len(tops) == len(names) else numbered
+    return DensityClasses(h, grid, density, grid[tops], cuts, labels, called)
 
 
 def stable_bandwidths(values: ArrayLike, n_modes: int) -> tuple[float, float]:

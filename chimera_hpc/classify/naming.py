@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from string import ascii_uppercase
 
 import numpy as np
 
@@ -12,17 +13,22 @@ from chimera_hpc.classify.tree import Floats, Integers
 CLASSES = ("ordered", "chimera", "disordered")
 STEADY, NO_WINDOW = "steady", "no_window"
 RESERVED = frozenset({STEADY, NO_WINDOW})
+TRIPLET, LETTERS = "triplet", "letters"
 Rule = str | Sequence[str]
+"""`TRIPLET`, the paper's rule; `LETTERS`, A, B, C, ...; or names by increasing V_theta."""
 
 
-def base_size(rule: Rule) -> int:
+def base_size(rule: Rule, cuts: Sequence[int] = ()) -> int:
     """Return the number of clusters of the base cut, which `rule` names directly.
 
+    With letters this is the first of `cuts`, else the paper's three or the number of names.
     Raises BadInput for an unknown rule, or a list of names that is empty, repeats one, or holds a
     reserved one.
     """
+    if rule == LETTERS:
+        return cuts[0] if len(cuts) else len(CLASSES)
     if isinstance(rule, str):
-        if rule != "triplet":
+        if rule != TRIPLET:
             raise BadInput(f"reduction.names is {rule!r}; allowed: 'triplet' or a list of names")
         return len(CLASSES)
     if not rule or len(set(rule)) != len(rule):
@@ -32,8 +38,23 @@ def base_size(rule: Rule) -> int:
     return len(rule)
 
 
-def name_base(centroids: Floats, rule: Rule) -> list[str]:
+def all_names(rule: Rule, n_classes: int) -> list[str]:
+    """Return the names that `rule` has for so many classes, in order."""
+    if rule == LETTERS:
+        return [letters(i) for i in range(n_classes)]
+    return list(CLASSES if isinstance(rule, str) else rule)
+
+
+def letters(i: int) -> str:
+    """Return the name of class i (from 0) without one of its own: A, ..., Z, AA, AB, ..."""
+    above, last = divmod(i, len(ascii_uppercase))
+    return (letters(above - 1) if above else "") + ascii_uppercase[last]
+
+
+def name_base(centroids: Floats, rule: Rule, sizes: Integers | None = None) -> list[str]:
     """Name the clusters of the base cut by their centroids (k, 3) in (V_theta, V_a, V_Omega).
+
+    ``"letters"``: A is the largest by `sizes` (k,), then B, C, ...; equal ones by V_theta.
 
     ``"triplet"``: of three clusters, chimera has the largest V_Omega. Of the other two, ordered has
     the smaller V_theta. Of two clusters (only two different points), ordered has the smaller
@@ -43,6 +64,12 @@ def name_base(centroids: Floats, rule: Rule) -> list[str]:
     """
     by_phase = [int(i) for i in np.argsort(centroids[:, 0], kind="stable")]
     names = [""] * len(centroids)
+    if rule == LETTERS:
+        counts = np.zeros(len(centroids)) if sizes is None else sizes
+        by_size = np.lexsort((centroids[:, 0], -counts))
+        for i, cluster in enumerate(by_size.tolist()):
+            names[cluster] = letters(i)
+        return names
     if not isinstance(rule, str):
         for name, cluster in zip(rule, by_phase, strict=False):
             names[cluster] = name

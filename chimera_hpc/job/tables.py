@@ -211,7 +211,9 @@ class Reduction(Table):
         None, gt=0, description="Cut of the dendrogram at this distance, too."
     )
     names: Annotated[str | tuple[str, ...], BeforeValidator(_names)] = Field(
-        "triplet", description='The rule "triplet", or a list of names by rising V_theta.'
+        "triplet",
+        description='The rule "triplet", or a list of names by rising V_theta. Classes of other '
+        "systems than the paper's ring under a preset are A, B, C, ... by the rule.",
     )
     show: Annotated[Texts, BeforeValidator(check_selections("reduction.show"))] = Field(
         (),

@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -41,6 +41,9 @@ _FAMILIES = {
     "multi-chimera": (TEAL, "v"),
 }
 _OTHERS = ((TEAL, "v"), ("#aa3377", "D"), ("#997700", "p"), ("#66ccee", "h"))
+# Classes without names of their own, A to D; E looks as A.
+_LETTERS = "ABCD"
+_PALER = (0.0, 0.35, 0.6, 0.75)
 _SHADES = {
     "ordered": ("#ee8866", "#8f1402", "#f4b8a4", "#5c0a00"),
     "chimera": ("#6da8e8", "#003a7d", "#a9cdf2", "#6a4fd0"),
@@ -196,6 +199,8 @@ def colour_of(name: str | None) -> str:
     if number and family in _SHADES:
         shades = _SHADES[family]
         return shades[(number - 1) % len(shades)]
+    if number and family in _LETTERS:
+        return to_hex(lighten(_look(family)[0], _PALER[(number - 1) % len(_PALER)]))
     return _look(name)[0]
 
 
@@ -208,6 +213,8 @@ def _look(name: str) -> tuple[str, str]:
     family, number = family_and_number(name)
     if family in _FAMILIES:
         return _FAMILIES[family]
+    if family in _LETTERS:
+        return _OTHERS[_LETTERS.index(family)]
     return _OTHERS[(number or sum(map(ord, name))) % len(_OTHERS)]
 
 

@@ -15,7 +15,9 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.classification import Classification, Cut, has_triplet
 from chimera_hpc.classify.modes import run_names
+from chimera_hpc.classify.naming import CLASSES
 from chimera_hpc.job import Points, Sweep
+from chimera_hpc.reduction.names import is_papers_system
 from chimera_hpc.reduction.results import TRIPLET
 
 Array = NDArray[np.float64]
@@ -97,6 +99,11 @@ class AnalysisInput:
             text = "no atlas: reduction.atlas names a sweep that has been reduced"
             raise BadInput(text)
         return next(iter(self.atlases.values()))
+
+    @property
+    def density_names(self) -> tuple[str, ...]:
+        """Names of three classes of sigma_1: the paper's for its system, else none."""
+        return CLASSES if is_papers_system(self.sweep) else ()
 
     def own_names(self) -> list[str | None]:
         """Return the class of each run by the sweep's own tree: also steady, no_window or None."""

@@ -19,14 +19,14 @@ from chimera_hpc.classify.modes import run_names
 from chimera_hpc.reduction.agreement_text import agreement_lines, cluster_lines
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
-from chimera_hpc.reduction.caveat import caveats
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
+from chimera_hpc.reduction.names import naming_rule
 from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
 from chimera_hpc.reduction.selection import check_selections
-from chimera_hpc.reduction.stability import tree_warnings
+from chimera_hpc.reduction.stability import one_state, tree_warnings
 from chimera_hpc.reduction.table import class_table
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import write_reduction
@@ -148,7 +148,7 @@ class _Work:
             linkage=spec.linkage,
             cuts=spec.cuts,
             depth=spec.depth,
-            names=spec.names,
+            names=naming_rule(store.sweep),
         )
         self.classification = made
         self.curves = {**self._analyses(), **(curves or {})}
@@ -156,7 +156,11 @@ class _Work:
             store.sweep, store.points, self.ledger, made, self.curves, claims, self.quality
         )
         measured = quality_warnings(store.sweep, self.status, self.scalars, self.quality, made.cuts)
-        self.results["warnings"] = [*caveats(store.sweep), *measured, *tree_warnings(made)]
+        self.results["warnings"] = [
+            *one_state(self.triplets, made),
+            *measured,
+            *tree_warnings(made),
+        ]
         self.curves = self.results["curves"]
         audit, line = kept_audit(self.place, self._basis)
         self.results |= audit

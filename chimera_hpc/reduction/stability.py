@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from chimera_hpc.classify.class_number import class_number
 from chimera_hpc.classify.classification import Classification
 from chimera_hpc.classify.tree import relative_gap
 
@@ -13,9 +15,25 @@ CLOSE_MERGES = 0.02
 """Relative gap of two merge heights below which a cut between them is called unstable."""
 
 
+ENOUGH = 30
+"""Runs from which it is said that they look like one state."""
+
+
 def tree_warnings(made: Classification) -> list[str]:
     """Return a line if the tree holds a sample only, and one for each cut that is unstable."""
     return [*_of_sample(made), *_of_cuts(made)]
+
+
+def one_state(triplets: NDArray[np.float64], made: Classification) -> list[str]:
+    """Return a line if the runs look like one state, which any cut parts nevertheless.
+
+    Of fewer than `ENOUGH` runs, nothing is said.
+    """
+    clustered = made.base.labels >= 0
+    if np.count_nonzero(clustered) < ENOUGH:
+        return []
+    found = class_number(triplets[clustered])
+    return [f"{found.sentence}: the classes are parts of one cloud"] if found.answer == 1 else []
 
 
 def runs_with_class(made: Classification) -> int:

@@ -15,8 +15,9 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Classification, Cut, classify, has_triplet
 from chimera_hpc.classify.modes import count_votes, modal_votes, vote_labels
-from chimera_hpc.classify.naming import NO_WINDOW, STEADY
+from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
+from chimera_hpc.reduction.names import naming_rule
 from chimera_hpc.reduction.reduction import RESULTS
 from chimera_hpc.reduction.results import TRIPLET, count_points, read_results
 from chimera_hpc.store.labelled import STORE_NAME
@@ -166,9 +167,10 @@ def _classified(
         triplets,
         status,
         linkage=spec.linkage,
-        cuts=sorted({*spec.cuts, *range(2, MOST_CLUSTERS + 1)}),
+        # The first names the classes: that of the job, as in its reduction.
+        cuts=list(dict.fromkeys([*spec.cuts, len(CLASSES), *range(2, MOST_CLUSTERS + 1)])),
         depth=spec.depth,
-        names=spec.names,
+        names=naming_rule(store.sweep),
         largest_tree=largest_tree,
         known=_known_tree(store, has_triplet(triplets, status)),
     )

@@ -2,8 +2,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sklearn.metrics import adjusted_rand_score
 
-from chimera_hpc.classify.agreement import adjusted_rand, classes_by_incoherence, confusion
+from chimera_hpc.classify.agreement import (
+    adjusted_rand,
+    classes_by_incoherence,
+    confusion,
+    rand_index,
+)
 from chimera_hpc.classify.verdicts import RULES
 
 
@@ -52,3 +58,10 @@ def test_rules_name_runs_by_one_number() -> None:
         *("ordered", "chimera", "chimera", "disordered")
     ]
     assert "Kemeth et al. 2016" in rules["g0"].text
+
+
+def test_rand_index_is_that_of_scikit_learn() -> None:
+    draw = np.random.default_rng(0)
+    for n, k in ((2, 2), (40, 3), (40, 1), (25, 25)):
+        first, second = draw.integers(0, k, n), draw.integers(0, 3, n)
+        assert rand_index(first, second) == pytest.approx(adjusted_rand_score(first, second))

@@ -6,7 +6,7 @@ import pytest
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Classification, classify
-from chimera_hpc.classify.naming import name_base
+from chimera_hpc.classify.naming import all_names, name_base
 
 # Centres in (V_theta, V_a, V_Omega) near those of the paper's three classes.
 ORDERED, CHIMERA, DISORDERED = (0.07, 0.01, 0.01), (0.27, 0.09, 0.11), (0.53, 0.02, 0.01)
@@ -217,3 +217,23 @@ def test_bad_options_are_named(three: np.ndarray, options: dict, message: str) -
     with pytest.raises(BadInput, match=message) as caught:
         classify(three, done(three), **options)
     assert "\n" not in str(caught.value)
+
+
+def test_letters_go_to_the_largest_clusters_of_the_first_cut_first():
+    rng = np.random.default_rng(3)
+    centres = np.array([[0.9, 0.5, 0.1], [0.1, 0.1, 0.9], [0.5, 0.9, 0.5], [0.1, 0.9, 0.1]])
+    points = np.repeat(centres, [4, 12, 8, 20], axis=0) + 0.01 * rng.random((44, 3))
+    found = classify(points, done(points), cuts=(4, 2), names="letters")
+    assert found.cuts[4].names == ("A", "B", "C", "D")
+    assert found.cuts[4].sizes.tolist() == [20, 12, 8, 4]
+    assert found.base.names == found.cuts[4].names
+    assert set(found.cuts[2].names) <= {"A", "B", "C", "D"}
+    assert classify(points, done(points), cuts=(2,), names="letters").cuts[2].names == ("A", "B")
+    three = classify(points, done(points), cuts=(3, 4), names="letters")
+    assert three.cuts[3].names == ("A", "B", "C")
+    assert {name[0] for name in three.cuts[4].names} == {"A", "B", "C"}
+
+
+def test_letters_go_on_after_z():
+    assert all_names("letters", 28)[-3:] == ["Z", "AA", "AB"]
+    assert name_base(np.zeros((2, 3)), "letters", np.array([1, 1])) == ["A", "B"]

@@ -21,6 +21,7 @@ from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
 from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.reduction.selection import check_selections, find_point, single_point
 from chimera_hpc.reduction.table import class_table
+from chimera_hpc.report.content import Content
 from chimera_hpc.run.initial_state import initial_state
 from chimera_hpc.store.store import Store
 
@@ -533,3 +534,31 @@ def test_table_too_large_for_the_terminal_counts_cells(shape):
         f"{half:8d} cells chimera",
         f"modal class of the runs that oscillate: all in {2 * half} cells",
     ]
+
+
+def test_classes_of_another_system_have_letters_everywhere(tmp_path):
+    filled(tmp_path, FAST, "features.refine=sine-fit", "grid.seeds=12")
+    _, lines = told(tmp_path)
+    cut = results_in(tmp_path)["cuts"]["3"]
+    assert [cluster["name"] for cluster in cut["clusters"]] == ["A", "B", "C"]
+    assert [cell["class"] for cell in cut["cells"]] == ["A", "B", "C"]
+    assert Store.open(tmp_path / "store.zarr").reduction().attributes["atlas_names"] == list("ABC")
+    text = "\n".join([*lines, (tmp_path / "results.json").read_text()])
+    assert not any(name in text for name in CLASSES.values())
+    assert Content.read(tmp_path).classification.base.names == ("A", "B", "C")
+
+
+def test_runs_of_one_state_are_said_to_be_one(tmp_path):
+    store = make_store(tmp_path, FAST, "grid.seeds=24")
+    store.start_run({})
+    draw = np.random.default_rng(1)
+    for i in range(store.n_blocks):
+        made = block_results(store, i)
+        made.scalars[:, :3] = np.multiply(
+            CENTRES[2], 1.0 + 0.1 * draw.normal(size=(len(made.status), 3))
+        )
+        store.write_block(i, made, 1, 1)
+    _, lines = told(tmp_path)
+    (said,) = (line for line in results_in(tmp_path)["warnings"] if "state" in line)
+    assert said.startswith("72 of 72 runs look like one state (gap ")
+    assert f"warning: {said}" in lines

@@ -12,13 +12,15 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.agreement import adjusted_rand, classes_by_incoherence, confusion
 from chimera_hpc.classify.density import density_classes
-from chimera_hpc.classify.naming import CLASSES, STEADY
+from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.classify.verdicts import RULES
 from chimera_hpc.reduction.analyses.incoherence import strengths, unit_of
 from chimera_hpc.reduction.analyses.judged import most_frequent
 from chimera_hpc.reduction.analysis_input import AnalysisInput
+from chimera_hpc.reduction.names import is_papers_system
 
 Verdicts = list[str | None]
+_COMMON = {*CLASSES, STEADY, NO_WINDOW, None}
 
 
 def agreement(given: AnalysisInput) -> dict[str, Any]:
@@ -27,12 +29,17 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
     Triplets, SI (first of ``reduction.deltas``), sigma_1, and those of `classify.verdicts.RULES`
     whose numbers the store has. Steady runs count as ordered. ``pairs`` has the confusion matrix of
     the runs, Cohen's kappa over runs and over cells, and the adjusted Rand index of the runs;
-    ``differing`` lists the cells whose modal classes are not all equal.
+    ``differing`` lists the cells whose modal classes are not all equal. Where triplets and sigma_1
+    have names of their own (`reduction.names`), kappa is not defined for them, and cells are
+    compared without them; the adjusted Rand index needs no names.
     """
     given.need_runs()
     methods, rules = _methods(given)
     modal = {name: _modal(given, verdicts) for name, verdicts in methods.items()}
     names = list(methods)
+    comparable = {
+        name: verdicts for name, verdicts in modal.items() if not (set(verdicts) - _COMMON)
+    }
     return {
         "delta": given.sweep.reduction.deltas[0],
         "classes": CLASSES,
@@ -48,7 +55,7 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
         "differing": [
             given.place(i) | {name: verdicts[i] for name, verdicts in modal.items()}
             for i in range(given.n_cells)
-            if len({verdicts[i] for verdicts in modal.values()}) > 1
+            if len({verdicts[i] for verdicts in comparable.values()}) > 1
         ],
     }
 
@@ -59,9 +66,13 @@ def _methods(given: AnalysisInput) -> tuple[dict[str, Verdicts], dict[str, str]]
         raise BadInput("reduction.deltas is needed")
     spec = given.sweep.reduction
     strength = strengths(given.local_sigma(), unit_of(given, spec.delta_unit), spec.deltas[0])
-    density = density_classes(np.where(given.has_result, given.scalar("sigma_1"), np.nan))
+    sigma = np.where(given.has_result, given.scalar("sigma_1"), np.nan)
+    density = density_classes(sigma, names=given.density_names)
     methods: dict[str, Verdicts] = {
-        "triplets": ["ordered" if n == STEADY else n for n in given.own_names()],
+        "triplets": [
+            "ordered" if n == STEADY and is_papers_system(given.sweep) else n
+            for n in given.own_names()
+        ],
         "SI": list(classes_by_incoherence(np.nan_to_num(strength))),
         "sigma_1": [density.names[k] if k >= 0 else None for k in density.labels],
     }

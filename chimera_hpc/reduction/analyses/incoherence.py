@@ -97,7 +97,7 @@ def sigma_l(given: AnalysisInput) -> dict[str, Any]:
     """
     given.need_runs()
     values = np.where(given.has_result, given.scalar("sigma_1"), np.nan)
-    made = density_classes(values)
+    made = density_classes(values, names=given.density_names)
     rows = []
     for i in range(given.n_cells):
         labels = made.labels[given.runs(i)]

@@ -14,7 +14,7 @@ from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.classify.robustness import fraction_curve
 from chimera_hpc.reduction.analysis_input import AnalysisInput
 
-_ORDER = (*CLASSES, STEADY, NO_WINDOW)
+_FIRST, _LAST = CLASSES, (STEADY, NO_WINDOW)
 
 
 def atlas(given: AnalysisInput) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def _judged_cells(given: AnalysisInput, judge: Atlas) -> list[dict[str, Any]]:
             {
                 **given.place(i),
                 "class": modal,
-                "votes": {name: votes[name] for name in _ORDER if votes[name]},
+                "votes": {name: votes[name] for name in _in_order(votes)},
                 "triplet": given.triplets[chosen].mean(axis=0) if oscillates else None,
                 "distance": float(distance[chosen].mean()) if oscillates else None,
             }
@@ -58,7 +58,13 @@ def _judged_cells(given: AnalysisInput, judge: Atlas) -> list[dict[str, Any]]:
 
 def most_frequent(votes: Counter[Any]) -> str | None:
     """Return the class with most votes, the earlier in the fixed order at a tie."""
-    return max((n for n in _ORDER if votes[n]), key=lambda name: votes[name], default=None)
+    return max(_in_order(votes), key=lambda name: votes[name], default=None)
+
+
+def _in_order(votes: Counter[Any]) -> list[str]:
+    """Return the classes that have votes: the paper's, others by name, then steady, no window."""
+    others = sorted(name for name in votes if name and name not in (*_FIRST, *_LAST))
+    return [name for name in (*_FIRST, *others, *_LAST) if votes[name]]
 
 
 def robustness(given: AnalysisInput) -> dict[str, Any]:

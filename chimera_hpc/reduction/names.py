@@ -1,0 +1,34 @@
+"""Names of the classes of a sweep: the paper's where they are earned, else letters."""
+
+from __future__ import annotations
+
+from chimera_hpc.classify.naming import LETTERS, TRIPLET, Rule
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.tables import Features
+from chimera_hpc.measures.conventions import PRESETS
+
+
+def naming_rule(sweep: Sweep) -> Rule:
+    """Return the names that the job gives, else the rule of its classes.
+
+    Ordered, chimera and disordered are the names of the paper's three clusters: they hold for its
+    model, on its ring, measured under a preset. The clusters of other runs are A, B, C, ...
+    """
+    if sweep.reduction.names != TRIPLET:
+        return sweep.reduction.names
+    return TRIPLET if is_papers_system(sweep) else LETTERS
+
+
+def is_papers_system(sweep: Sweep) -> bool:
+    """Tell whether a sweep is of the paper's model on its ring, measured under a preset."""
+    network = sweep.network
+    on_ring = network is None or (network.kind == "ring" and network.signals == "nodes")
+    return sweep.model == "topological_fhn" and on_ring and _is_preset(sweep.features)
+
+
+def _is_preset(features: Features) -> bool:
+    """Tell whether the keys that presets set are those of one preset."""
+    return any(
+        all(getattr(features, key) == value for key, value in preset.items())
+        for preset in PRESETS.values()
+    )
