@@ -16,6 +16,12 @@ from scipy.spatial import cKDTree
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify import naming, tree
+from chimera_hpc.classify.classifiers import (
+    AGGLOMERATIVE,
+    Classifier,
+    check_classifier,
+    labels_by,
+)
 from chimera_hpc.classify.tree import Floats, Integers, Split
 
 LARGEST_TREE: dict[tree.Linkage, int] = {"ward": 100_000, "average": 10_000, "complete": 10_000}
@@ -63,9 +69,16 @@ class Classification:
     """The requested depth threshold, if any. Its cut is in `cuts` by its number of clusters."""
     sampled: bool
     """Whether the tree holds a sample only. Other points have the label of the nearest leaf."""
+    classifier: Classifier = AGGLOMERATIVE
+    """What made the cuts; others than the tree make each cut for itself."""
 
     def order_of_splits(self, until: int = 8) -> tuple[Split, ...]:
-        """Return which class splits at each step as the depth threshold decreases."""
+        """Return which class splits at each step as the depth threshold decreases.
+
+        None does with another classifier than the tree.
+        """
+        if self.classifier != AGGLOMERATIVE:
+            return ()
         leaf_labels = self.base.labels[self.members]
         return tree.splits_below(self.linkage, leaf_labels, self.base.names, until)
 
@@ -75,6 +88,7 @@ def classify(
     status: ArrayLike,
     *,
     linkage: tree.Linkage = "ward",
+    classifier: Classifier = AGGLOMERATIVE,
     cuts: Sequence[int] = (3, 4, 5),
     depth: float | None = None,
     names: naming.Rule = "triplet",
@@ -90,6 +104,10 @@ def classify(
     status : (n,) integers
         `chimera_hpc.base.status.Status` of each point.
     linkage : {"ward", "average", "complete"}
+    classifier : {"agglomerative", "kmeans", "mixture", "hdbscan"}
+        What makes the classes: the tree, or one of `classifiers.OTHERS` on the scaled triplets. The
+        tree is grown in any case. HDBSCAN finds the number of classes by itself, and gives some
+        points none (label -1).
     cuts : numbers of clusters. Equal points stay in one cluster, so a cut may have fewer classes
         than requested (none if no run oscillates).
     depth : depth threshold d in scaled space: merges higher than d are undone.
@@ -112,11 +130,12 @@ def classify(
     Raises
     ------
     BadInput
-        Unknown linkage or naming rule, a number of clusters below 1, a depth that is not positive.
+        Unknown linkage, classifier or naming rule, a number of clusters below 1, a depth that is not positive.
     ValueError
         A DONE point whose triplet is not finite.
     """
     _check(linkage, cuts, depth)
+    check_classifier(classifier)
     base_size = naming.base_size(names, cuts)
     points = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
     clustered = np.flatnonzero(has_triplet(points, status))
@@ -130,7 +149,8 @@ def classify(
     else:
         grown, leaves = known[0], np.searchsorted(clustered, known[1])
     nearest = _nearest_leaf(scaled, leaves)
-    maker = _CutMaker(points, clustered, grown, nearest, names, base_size)
+    by = scaled if classifier != AGGLOMERATIVE else None
+    maker = _CutMaker(points, clustered, grown, nearest, names, base_size, classifier, by)
     wanted = {int(k): maker.make(int(k)) for k in cuts}
     if depth is not None:
         wanted[tree.clusters_at(grown, depth)] = maker.make(tree.clusters_at(grown, depth), depth)
@@ -144,6 +164,7 @@ def classify(
         base=maker.make(base_size),
         depth=depth,
         sampled=len(leaves) < len(clustered),
+        classifier=classifier,
     )
 
 
@@ -201,17 +222,20 @@ class _CutMaker:
     nearest: Integers
     rule: naming.Rule
     base_size: int
+    classifier: Classifier
+    scaled: Floats | None
+    """Scaled triplets of the clustered points, for another classifier than the tree."""
 
     def make(self, n_clusters: int, depth: float | None = None) -> Cut:
         labels = np.full(len(self.points), -1, dtype=np.int64)
-        if len(self.clustered) == 0:
+        raw = self._labels(n_clusters) if len(self.clustered) else np.empty(0, dtype=np.int64)
+        if raw.max(initial=-1) < 0:
             empty = np.empty((0, 3))
             return Cut(labels, (), (), empty, np.empty(0, dtype=np.int64), depth or 0.0)
-        raw = self._labels(n_clusters)
         centroids, sizes = self._centroids(raw)
         families, names, order = self._names(raw, centroids)
         rank = np.argsort(order)
-        labels[self.clustered] = rank[raw]
+        labels[self.clustered[raw >= 0]] = rank[raw[raw >= 0]]
         height = tree.middle_height(self.tree, n_clusters) if depth is None else depth
         return Cut(
             labels=labels,
@@ -223,11 +247,15 @@ class _CutMaker:
         )
 
     def _labels(self, n_clusters: int) -> Integers:
-        return tree.cut(self.tree, n_clusters)[self.nearest]
+        if self.scaled is None:
+            return tree.cut(self.tree, n_clusters)[self.nearest]
+        return labels_by(self.classifier, self.scaled, n_clusters)
 
     def _centroids(self, labels: Integers) -> tuple[Floats, Integers]:
-        sizes = np.bincount(labels)
-        sums = [np.bincount(labels, weights=column) for column in self.points[self.clustered].T]
+        known = labels >= 0
+        members = self.points[self.clustered[known]]
+        sizes = np.bincount(labels[known])
+        sums = [np.bincount(labels[known], weights=column) for column in members.T]
         return np.stack(sums, axis=1) / sizes[:, None], sizes.astype(np.int64)
 
     def _names(self, labels: Integers, centroids: Floats) -> tuple[list[str], list[str], Integers]:

@@ -91,8 +91,9 @@ def inherit(base_labels: Integers, base_names: Sequence[str], labels: Integers) 
     A finer cluster lies inside one base class. A coarser one is a union of base classes and takes
     the name of the largest, so names stay different.
     """
+    both = (labels >= 0) & (base_labels >= 0)
     counts = np.zeros((labels.max() + 1, len(base_names)), dtype=np.int64)
-    np.add.at(counts, (labels, base_labels), 1)
+    np.add.at(counts, (labels[both], base_labels[both]), 1)
     return [base_names[family] for family in counts.argmax(axis=1)]
 
 

@@ -202,6 +202,11 @@ class Reduction(Table):
     linkage: Literal["ward", "average", "complete"] = Field(
         "ward", description="Distance between clusters."
     )
+    classifier: Literal["agglomerative", "kmeans", "mixture", "hdbscan"] = Field(
+        "agglomerative",
+        description="What makes the classes: the tree, cut; or scikit-learn's k-means, Gaussian "
+        "mixture or HDBSCAN, which finds the number of classes by itself.",
+    )
     cuts: Annotated[
         tuple[Annotated[int, Field(ge=2, le=1000)], ...],
         BeforeValidator(as_tuple),

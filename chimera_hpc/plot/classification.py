@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from chimera_hpc.plot import style
-from chimera_hpc.plot.dendrogram import draw_dendrogram
+from chimera_hpc.plot.dendrogram import draw_dendrogram, height_of
 from chimera_hpc.plot.figure_input import FigureInput
 from chimera_hpc.plot.modes import draw_modal_classes, vote_handles
 from chimera_hpc.plot.projections import draw_projection
@@ -25,7 +25,7 @@ def classification_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     figure = style.new_figure(style.PAGE + 1.5, 2.9)
     axes = list(figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15)))
     leaf_labels, n_runs = cut.labels[tree.members], int(np.count_nonzero(cut.labels >= 0))
-    draw_dendrogram(axes[0], tree.linkage, leaf_labels, cut.names, cut.depth, n_runs)
+    draw_dendrogram(axes[0], tree.linkage, leaf_labels, cut.names, height_of(tree, cut), n_runs)
     draw_projection(axes[1], data.triplets, cut.labels, cut.names)
     style.letter(axes)
     draw_modal_classes(axes[2], data.axes, classes, data.votes(n_clusters))

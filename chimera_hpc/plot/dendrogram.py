@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.cluster import hierarchy
 
+from chimera_hpc.classify.classification import Classification, Cut
+from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import FigureInput
 
@@ -23,7 +25,13 @@ def dendrogram_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     if len(tree.members) < 2:
         return None
     n_runs = int(np.count_nonzero(cut.labels >= 0))
-    return dendrogram(tree.linkage, cut.labels[tree.members], cut.names, cut.depth, n_runs)
+    labels = cut.labels[tree.members]
+    return dendrogram(tree.linkage, labels, cut.names, height_of(tree, cut), n_runs)
+
+
+def height_of(tree: Classification, cut: Cut) -> float:
+    """Return the height of the line that makes a cut; NaN if no line does."""
+    return cut.depth if tree.classifier == AGGLOMERATIVE else float("nan")
 
 
 @style.styled
@@ -51,7 +59,7 @@ def draw_dendrogram(
 ) -> None:
     """Draw every merge as a bracket, in its class's colour below the cut, and the cut as a line.
 
-    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line;
+    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line, NaN for none;
     n_runs is the number of runs if the leaves are a sample of them.
     """
     segments, owner = brackets(linkage, leaf_labels)
@@ -62,8 +70,9 @@ def draw_dendrogram(
         lines.set_rasterized(len(chosen) > 2000)
         lines.set_label(style.drawn(names[label]) if label >= 0 else "above the cut")
         axes.add_collection(lines)
-    axes.axhline(depth, color="black", linewidth=0.9, linestyle="--", label="cut")
-    top = max(float(linkage[:, 2].max(initial=0.0)), depth, 1e-12)
+    if np.isfinite(depth):
+        axes.axhline(depth, color="black", linewidth=0.9, linestyle="--", label="cut")
+    top = np.nanmax([linkage[:, 2].max(initial=0.0), depth, 1e-12])
     n_places = max(len(leaf_labels), 1)
     axes.set_xlim(-0.01 * n_places - 0.5, 1.01 * n_places - 0.5)
     axes.set_ylim(0.0, 1.05 * top)
@@ -72,7 +81,8 @@ def draw_dendrogram(
     axes.set_xlabel(f"{sample}{n_runs or len(leaf_labels)} runs", labelpad=6.0)
     axes.set_ylabel("depth $d$ (scaled units)")
     # Beside the panel's letter: at the line itself it would cover branches.
-    axes.set_title(f"cut at $d$ = {depth:.3g}", loc="right", fontsize="medium")
+    words = f"cut at $d$ = {depth:.3g}" if np.isfinite(depth) else "classes without the tree"
+    axes.set_title(words, loc="right", fontsize="medium")
 
 
 def brackets(

@@ -31,6 +31,7 @@ def reduction_variables(
     }
     attributes: dict[str, Any] = {
         "method": classification.method,
+        "classifier": classification.classifier,
         "sampled": classification.sampled,
         "variations": list(TRIPLET),
         "cuts": list(classification.cuts),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from chimera_hpc.base.files import remove_leftovers, temporary_name, write_atomically
 from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
+from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.classify.modes import run_names
 from chimera_hpc.reduction.agreement_text import agreement_lines, cluster_lines
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
@@ -146,6 +147,7 @@ class _Work:
             self.triplets,
             self.status,
             linkage=spec.linkage,
+            classifier=spec.classifier,
             cuts=spec.cuts,
             depth=spec.depth,
             names=naming_rule(store.sweep),
@@ -249,6 +251,8 @@ class _Work:
         if members == 0:
             self.note("no run oscillates yet: there is nothing to classify")
             return
+        if self.classification.classifier != AGGLOMERATIVE:
+            self.note(f"classes by {self.classification.classifier}, not by the tree")
         for asked, cut in self.classification.cuts.items():
             if len(cut.names) < asked:
                 self.note(f"{asked} clusters: only {len(cut.names)}, of {members} oscillating runs")

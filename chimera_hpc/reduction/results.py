@@ -111,6 +111,7 @@ def _describe_cut(
 def _describe_clustering(classification: Classification) -> dict[str, Any]:
     return {
         "linkage": classification.method,
+        "classifier": classification.classifier,
         "minimum": dict(zip(TRIPLET, classification.scaler[0], strict=True)),
         "maximum": dict(zip(TRIPLET, classification.scaler[1], strict=True)),
         "sampled": classification.sampled,

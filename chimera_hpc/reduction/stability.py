@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.classify.class_number import class_number
 from chimera_hpc.classify.classification import Classification
+from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.classify.tree import relative_gap
 
 CLOSE_MERGES = 0.02
@@ -51,7 +52,7 @@ def _of_sample(made: Classification) -> Iterator[str]:
 
 
 def _of_cuts(made: Classification) -> Iterator[str]:
-    for asked, cut in made.cuts.items():
+    for asked, cut in made.cuts.items() if made.classifier == AGGLOMERATIVE else ():
         gap = relative_gap(made.linkage, len(cut.names))
         if gap < CLOSE_MERGES:
             yield (

@@ -167,6 +167,7 @@ def _classified(
         triplets,
         status,
         linkage=spec.linkage,
+        classifier=spec.classifier,
         # The first names the classes: that of the job, as in its reduction.
         cuts=list(dict.fromkeys([*spec.cuts, len(CLASSES), *range(2, MOST_CLUSTERS + 1)])),
         depth=spec.depth,

@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 from sklearn.cluster import AgglomerativeClustering
 from sklearn.metrics import adjusted_rand_score
 
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.class_number import class_number
-from chimera_hpc.classify.classifiers import OTHERS, labels_by
+from chimera_hpc.classify.classification import classify
+from chimera_hpc.classify.classifiers import OTHERS, Classifier, labels_by
 
 Array = NDArray[np.float64]
 CENTRES = np.array([[0.05, 0.01, 0.001], [0.3, 0.1, 0.11], [0.55, 0.02, 0.01]])
@@ -69,3 +72,29 @@ def test_fewer_different_points_than_classes() -> None:
     for classifier in ("kmeans", "hdbscan"):
         labels = labels_by(classifier, np.repeat([[0.0], [1.0]], 6, axis=0), 3)
         assert len(set(labels.tolist())) == 2
+
+
+@pytest.mark.parametrize("classifier", OTHERS)
+def test_classes_by_other_classifiers_have_the_same_names(classifier: Classifier) -> None:
+    points = kinds(14, 13, 13)
+    status = np.full(len(points), Status.DONE)
+    by_tree = classify(points, status, cuts=(3,))
+    found = classify(points, status, cuts=(3,), classifier=classifier)
+    np.testing.assert_array_equal(found.cuts[3].labels, by_tree.cuts[3].labels)
+    assert found.cuts[3].names == by_tree.cuts[3].names == ("ordered", "chimera", "disordered")
+    assert found.order_of_splits() == ()
+    shuffled = np.random.default_rng(2).permutation(len(points))
+    again = classify(points[shuffled], status, cuts=(3,), classifier=classifier)
+    np.testing.assert_array_equal(again.cuts[3].labels, found.cuts[3].labels[shuffled])
+
+
+def test_hdbscan_may_leave_all_runs_without_a_class() -> None:
+    points = np.random.default_rng(0).random((12, 3))
+    found = classify(points, np.full(12, Status.DONE), classifier="hdbscan", cuts=(3,))
+    assert found.cuts[3].names == ()
+    assert (found.cuts[3].labels == -1).all()
+
+
+def test_unknown_classifiers_are_refused_with_the_known_ones() -> None:
+    with pytest.raises(BadInput, match="classifier is 'dbscan'; allowed: agglomerative, kmeans"):
+        classify(np.zeros((2, 3)), [Status.DONE] * 2, classifier="dbscan")  # type: ignore[arg-type]

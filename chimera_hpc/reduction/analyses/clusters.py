@@ -12,7 +12,8 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.agreement import adjusted_rand
 from chimera_hpc.classify.class_number import class_number
-from chimera_hpc.classify.classifiers import OTHERS, labels_by
+from chimera_hpc.classify.classification import classify
+from chimera_hpc.classify.classifiers import AGGLOMERATIVE, OTHERS, labels_by
 from chimera_hpc.reduction.analysis_input import AnalysisInput, Array
 
 _FEWEST = 10
@@ -34,7 +35,7 @@ def number_of_classes(given: AnalysisInput) -> dict[str, Any]:
 
 
 def classifiers(given: AnalysisInput) -> dict[str, Any]:
-    """Classes of the clustered runs by the tree (first cut) and by other classifiers.
+    """Classes of the clustered runs by the job's classifier (first cut) and by the others.
 
     ``labels`` (n,) by classifier, -1 for a run in no class; sizes of the classes; and the adjusted
     Rand index of each pair of classifiers.
@@ -42,8 +43,13 @@ def classifiers(given: AnalysisInput) -> dict[str, Any]:
     points = _points(given)
     scaled = tree.scale(points, tree.limits(points))
     n_classes = len(given.cut.names)
-    labels = {"agglomerative": given.cut.labels[given.clustered]}
-    labels |= {name: labels_by(name, scaled, n_classes) for name in OTHERS}
+    own = given.sweep.reduction.classifier
+    labels = {own: given.cut.labels[given.clustered]}
+    if own != AGGLOMERATIVE:
+        k, linkage = max(n_classes, 1), given.sweep.reduction.linkage
+        tree_of = classify(points, given.status[given.clustered], linkage=linkage, cuts=(k,))
+        labels[AGGLOMERATIVE] = tree_of.cuts[k].labels
+    labels |= {name: labels_by(name, scaled, max(n_classes, 1)) for name in OTHERS if name != own}
     texts = {name: [None if x < 0 else str(x) for x in found] for name, found in labels.items()}
     whole = {name: np.full(len(given.status), -1) for name in labels}
     for name, found in labels.items():
