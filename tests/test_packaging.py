@@ -30,6 +30,7 @@ LAYERS = (
     "measures",
     "classify",
     "job",
+    "pipeline",
     "plot",
     "store",
     "run",

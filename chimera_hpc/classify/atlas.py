@@ -57,7 +57,7 @@ class Atlas:
         reliability of a class: it is 0 at a training point, and a class is not reliable if the
         distance is as large as that between two classes.
         """
-        values = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
+        values = np.asarray(triplets, dtype=np.float64).reshape(-1, self.points.shape[1])
         label = np.full(len(values), -1, dtype=np.int64)
         distance = np.full(len(values), np.nan)
         usable = np.isfinite(values).all(axis=1)

@@ -130,14 +130,16 @@ def classify(
     Raises
     ------
     BadInput
-        Unknown linkage, classifier or naming rule, a number of clusters below 1, a depth that is not positive.
+        Unknown linkage, classifier or naming rule, a number of clusters below 1, a depth that
+        is not positive.
     ValueError
         A DONE point whose triplet is not finite.
     """
     _check(linkage, cuts, depth)
     check_classifier(classifier)
     base_size = naming.base_size(names, cuts)
-    points = np.asarray(triplets, dtype=np.float64).reshape(-1, 3)
+    points = np.asarray(triplets, dtype=np.float64)
+    points = points if points.ndim == 2 else points.reshape(-1, 3)
     clustered = np.flatnonzero(has_triplet(points, status))
     if not np.isfinite(points[clustered]).all():
         raise ValueError("a point with status DONE has a triplet that is not finite")
@@ -194,7 +196,7 @@ def _sample(scaled: Floats, largest: int) -> Integers:
     if len(order) <= largest:
         return order.astype(np.int64)
     boxes = np.minimum((scaled[order] * _BINS).astype(np.int64), _BINS - 1)
-    box = boxes @ np.array([_BINS * _BINS, _BINS, 1])
+    box = boxes @ _BINS ** np.arange(scaled.shape[1])[::-1]
     by_box = np.argsort(box, kind="stable")
     steps = (np.arange(largest) + 0.5) * (len(order) / largest)
     first_of_box = np.unique(box[by_box], return_index=True)[1]
@@ -230,7 +232,7 @@ class _CutMaker:
         labels = np.full(len(self.points), -1, dtype=np.int64)
         raw = self._labels(n_clusters) if len(self.clustered) else np.empty(0, dtype=np.int64)
         if raw.max(initial=-1) < 0:
-            empty = np.empty((0, 3))
+            empty = np.empty((0, self.points.shape[1]))
             return Cut(labels, (), (), empty, np.empty(0, dtype=np.int64), depth or 0.0)
         centroids, sizes = self._centroids(raw)
         families, names, order = self._names(raw, centroids)

@@ -9,6 +9,7 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from chimera_hpc.measures.acm import adaptive_coherence
+    from chimera_hpc.measures.analytic import hilbert_features, wavelet_features
     from chimera_hpc.measures.centres import centre_of_mass
     from chimera_hpc.measures.coherence import chimera_index, metastability
     from chimera_hpc.measures.correlations import g0, h0
@@ -32,6 +33,7 @@ _HOMES = {
     "fourier_features": "fourier",
     "g0": "correlations",
     "h0": "correlations",
+    "hilbert_features": "analytic",
     "local_order": "order_parameters",
     "mean_phase_velocity": "phase_velocity",
     "metastability": "coherence",
@@ -41,6 +43,7 @@ _HOMES = {
     "sigma": "incoherence",
     "strength_of_incoherence": "incoherence",
     "total_variations": "variation",
+    "wavelet_features": "analytic",
 }
 _OTHER_NAMES = {"strength_of_incoherence": "strength_of_run"}
 
@@ -52,6 +55,7 @@ __all__ = [
     "fourier_features",
     "g0",
     "h0",
+    "hilbert_features",
     "local_order",
     "mean_phase_velocity",
     "metastability",
@@ -61,6 +65,7 @@ __all__ = [
     "sigma",
     "strength_of_incoherence",
     "total_variations",
+    "wavelet_features",
 ]
 
 

@@ -61,7 +61,7 @@ _FREQUENCY = QUANTITIES.index("frequency")
 
 
 @dataclass(frozen=True, eq=False)
-class FourierFeatures:
+class NodeFeatures:
     """Means and standard deviations over windows of the lines of N signals.
 
     All arrays have shape (N,) and are NaN unless `status` is DONE. The standard deviations are NaN
@@ -132,7 +132,7 @@ def fourier_features(
     time_origin: TimeOrigin = "window",
     steady: Steady = "apart",
     steady_threshold: float = 1e-2,
-) -> FourierFeatures:
+) -> NodeFeatures:
     r"""Mean and standard deviation of amplitude, frequency, phase and baseline of each signal.
 
     A window runs from a maximum of the reference signal to its (n_peaks - 1)-th next maximum, both
@@ -180,7 +180,7 @@ def fourier_features(
 
     Returns
     -------
-    FourierFeatures
+    NodeFeatures
         Status STEADY if u varies less than `steady_threshold`; else NO_WINDOW if the reference
         signal ("own": any signal) has fewer than n_peaks maxima; else DONE. Constant signals among
         oscillating ones have amplitude, frequency and phase 0.
@@ -241,7 +241,7 @@ def measure_signals(
     phase_mean: PhaseMean = "circular",
     steady: Steady = "apart",
     **options: Any,
-) -> FourierFeatures:
+) -> NodeFeatures:
     """Do as `fourier_features`, without a look at what the signals are."""
     choice("phase_mean", phase_mean, get_args(PhaseMean))
     choice("steady", steady, get_args(Steady))
@@ -256,9 +256,7 @@ def measure_signals(
         out[: len(QUANTITIES)] = 0.0
         out[QUANTITIES.index("baseline")] = node_rows("u", u).mean(axis=1)
     rows = dict(zip((*FEATURES, "r_squared"), out, strict=True))
-    return FourierFeatures(
-        **rows, n_windows=n_windows, deviation=found.deviation, status=found.status
-    )
+    return NodeFeatures(**rows, n_windows=n_windows, deviation=found.deviation, status=found.status)
 
 
 @accepts_old_names(renaming.FEATURES)
@@ -369,4 +367,4 @@ def _mean_deviation(x: Array) -> float:
     return float(deviations.mean())
 
 
-assert tuple(f.name for f in fields(FourierFeatures))[: len(FEATURES)] == FEATURES
+assert tuple(f.name for f in fields(NodeFeatures))[: len(FEATURES)] == FEATURES

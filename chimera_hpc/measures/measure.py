@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from chimera_hpc.measures.fourier import FourierFeatures
+    from chimera_hpc.measures.fourier import NodeFeatures
 
 
 class MeasuredRun(NamedTuple):
@@ -22,7 +22,7 @@ class MeasuredRun(NamedTuple):
     """(T, N), as stored"""
     w: NDArray[np.float64]
     """(T, N)"""
-    features: FourierFeatures
+    features: NodeFeatures
     settings: Any
     """The job's table [features]: `job.tables.Features`."""
     distance: float

@@ -59,8 +59,8 @@ def draw_dendrogram(
 ) -> None:
     """Draw every merge as a bracket, in its class's colour below the cut, and the cut as a line.
 
-    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line, NaN for none;
-    n_runs is the number of runs if the leaves are a sample of them.
+    linkage (m - 1, 4) is SciPy's; leaf_labels (m,) index `names`; depth is the height of the line,
+    NaN for none; n_runs is the number of runs if the leaves are a sample of them.
     """
     segments, owner = brackets(linkage, leaf_labels)
     for label in range(-1, len(names)):

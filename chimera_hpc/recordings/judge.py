@@ -16,7 +16,7 @@ from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.conventions import PRESETS
-from chimera_hpc.measures.fourier import FourierFeatures, measure_signals
+from chimera_hpc.measures.fourier import NodeFeatures, measure_signals
 from chimera_hpc.measures.quality import FEW_SAMPLES
 from chimera_hpc.measures.variation import total_variations
 from chimera_hpc.measures.windows import maxima
@@ -123,7 +123,7 @@ class Verdict:
 class Measured:
     """What came out of a recording."""
 
-    features: FourierFeatures
+    features: NodeFeatures
     triplet: tuple[float, float, float]
     samples_a_period: float
     """Of the recording, for the fastest node; NaN without features."""
@@ -177,7 +177,7 @@ def measure(
 
 def features_of(
     made: Prepared, settings: Features, steady_threshold: float | None = None
-) -> FourierFeatures:
+) -> NodeFeatures:
     """Return the Fourier features of a prepared recording; steady is relative unless told."""
     options = settings.options()
     limit = _FLAT * _size(made.u) if steady_threshold is None else steady_threshold
@@ -232,7 +232,7 @@ def verdict_of(atlas: Atlas, triplet: Array) -> Verdict:
     return Verdict(found.name[0], distance, confidence, name, far)
 
 
-def scale_to(features: FourierFeatures, judge: Judge) -> tuple[float, float]:
+def scale_to(features: NodeFeatures, judge: Judge) -> tuple[float, float]:
     """Return the factors on times and signals that make their medians those of the atlas."""
     if features.status is not Status.DONE:
         raise BadInput(f"--rescale: {features.status.sentence}")
@@ -243,7 +243,7 @@ def scale_to(features: FourierFeatures, judge: Judge) -> tuple[float, float]:
     return frequency / judge.frequency, judge.amplitude / amplitude
 
 
-def _noise(made: Prepared, settings: Features, features: FourierFeatures) -> list[str]:
+def _noise(made: Prepared, settings: Features, features: NodeFeatures) -> list[str]:
     """Return a line where the clock has many more maxima than turns: windows follow them."""
     if features.status is not Status.DONE:
         return []
@@ -258,7 +258,7 @@ def _noise(made: Prepared, settings: Features, features: FourierFeatures) -> lis
     ]
 
 
-def _poor(made: Prepared, settings: Features, features: FourierFeatures) -> list[str]:
+def _poor(made: Prepared, settings: Features, features: NodeFeatures) -> list[str]:
     """Return a line where sines are a small part of what nodes do: noise, drift, an outlier."""
     if features.status is not Status.DONE:
         return []
@@ -277,7 +277,7 @@ def _poor(made: Prepared, settings: Features, features: FourierFeatures) -> list
             ] if poor else []  # fmt: skip
 
 
-def _unlike(features: FourierFeatures, judge: Judge) -> list[str]:
+def _unlike(features: NodeFeatures, judge: Judge) -> list[str]:
     """Return a line where the recording's unit of time seems to be another one."""
     frequency = float(np.median(features.frequency))
     ratio = max(frequency, 1e-300) / judge.frequency

@@ -20,7 +20,7 @@ from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.models import build
 from chimera_hpc.job.registry import measures, method
-from chimera_hpc.measures.fourier import FourierFeatures, measure_signals
+from chimera_hpc.measures.fourier import NodeFeatures, measure_signals
 from chimera_hpc.measures.measure import Measure, MeasuredRun
 from chimera_hpc.measures.quality import quality
 from chimera_hpc.measures.series import by_node, quantise, round_to
@@ -223,12 +223,10 @@ class _Block:
         """Return the point in words: ``P=3 seed=7``."""
         return " ".join(f"{name}={self.rows[row][name]}" for name in self.axes)
 
-    def features(self, u: Array) -> FourierFeatures:
+    def features(self, u: Array) -> NodeFeatures:
         return measure_signals(self.times, u.T, **self.options)
 
-    def scalars(
-        self, row: int, features: FourierFeatures, u: Array, w: Array, y_end: Array
-    ) -> Array:
+    def scalars(self, row: int, features: NodeFeatures, u: Array, w: Array, y_end: Array) -> Array:
         distance = self.distance(row, y_end)
         pairs = pairs_of(self.sweep, self.rows[row])
         run = MeasuredRun(self.times, u, w, features, self.sweep.features, distance, pairs)
