@@ -63,7 +63,7 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
         points = self._checked(X, reset=True)
         if self.names == TRIPLET and points.shape[1] != 3:
             raise BadInput(f'names = "triplet" is for V_theta, V_a, V_Omega, not {points.shape[1]}')
-        known = np.isfinite(points).all(axis=1)
+        known = np.asarray(np.isfinite(points).all(axis=1))
         made = classify(
             np.where(known[:, None], points, np.nan),
             np.where(known, Status.DONE, Status.STEADY),

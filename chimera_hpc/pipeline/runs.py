@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 
 
+_NODES = ("node", "link", "triangle")
+"""Dimensions along which a run has signals."""
+
+
 class SignalRun(NamedTuple):
     """Times t (T,), signals u (T, N), and w (T, N), the second component, where it is known."""
 
@@ -43,7 +47,7 @@ def _run_of(run: Any, number: int, step: float) -> SignalRun:
     if hasattr(run, "t") and hasattr(run, "u"):
         return SignalRun(run.t, run.u, getattr(run, "w", None))
     if isinstance(run, np.ndarray) and run.ndim == 2:
-        return SignalRun(step * np.arange(len(run)), run)
+        return SignalRun(step * np.arange(len(run), dtype=np.float64), run)
     if isinstance(run, tuple | list) and len(run) in (2, 3):
         return SignalRun(*run)
     raise BadInput(f"run {number} is neither (t, u) nor an array (times, nodes)")
@@ -54,10 +58,12 @@ def _of_dataset(data: Any) -> Iterator[SignalRun]:
     if missing:
         raise BadInput(f"the dataset has no {', '.join(sorted(missing))}")
     u = data["u"]
-    (node,) = [dim for dim in u.dims[-2:] if dim != "time"] or [None]
-    runs = [dim for dim in u.dims if dim not in ("time", node)]
-    if "time" not in u.dims or node is None:
-        raise BadInput(f"u has the dimensions {', '.join(map(str, u.dims))}; time is needed")
+    others = [dim for dim in u.dims if dim != "time"]
+    if "time" not in u.dims or len(others) < 2:
+        known = ", ".join(map(str, u.dims))
+        raise BadInput(f"u has the dimensions {known}; runs, time and nodes are needed")
+    node = next((name for name in _NODES if name in others), others[-1])
+    runs = [dim for dim in others if dim != node]
     stacked = u.stack(run=runs) if len(runs) != 1 else u.rename({runs[0]: "run"})
     t = np.asarray(data["time"].values, dtype=np.float64)
     for number in range(stacked.sizes["run"]):
