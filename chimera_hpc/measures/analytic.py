@@ -50,7 +50,7 @@ _FEWEST_SAMPLES = 4.0
 Complex = NDArray[np.complex128]
 
 
-class Profiles(NamedTuple):
+class NodeProfiles(NamedTuple):
     """Mean phase (rad), amplitude and frequency (cycles per unit of time) of N nodes, (N,) each."""
 
     phase: Array
@@ -58,7 +58,7 @@ class Profiles(NamedTuple):
     frequency: Array
 
 
-def hilbert_features(t: ArrayLike, u: ArrayLike, *, reference_node: int = 0) -> Profiles:
+def hilbert_features(t: ArrayLike, u: ArrayLike, *, reference_node: int = 0) -> NodeProfiles:
     """Mean phase, amplitude and frequency of each signal by its analytic signal.
 
     Parameters
@@ -86,7 +86,7 @@ def wavelet_features(
     low: float | None = None,
     high: float | None = None,
     reference_node: int = 0,
-) -> Profiles:
+) -> NodeProfiles:
     """Mean phase, amplitude and frequency of each signal along the ridge of a Morlet transform.
 
     Parameters
@@ -134,13 +134,13 @@ def _ridge(x: Array, step: float, lowest: float, highest: float) -> Complex:
     return best
 
 
-def _averages(made: Complex, step: float, reference: int) -> Profiles:
+def _averages(made: Complex, step: float, reference: int) -> NodeProfiles:
     """Return the averages of complex amplitudes (N, T) over time."""
     cut = int(ENDS * made.shape[1])
     inner = made[:, cut : made.shape[1] - cut]
     phase = np.unwrap(np.angle(inner), axis=1)
     turns = (phase[:, -1] - phase[:, 0]) / (2.0 * np.pi)
     relative = np.exp(1j * (phase - phase[reference])).mean(axis=1)
-    return Profiles(
+    return NodeProfiles(
         np.angle(relative), np.abs(inner).mean(axis=1), turns / (step * (inner.shape[1] - 1))
     )

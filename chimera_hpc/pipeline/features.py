@@ -68,8 +68,9 @@ refine, time_origin, steady, steady_threshold
     --------
     >>> t = 0.01 * np.arange(5000)
     >>> u = np.cos(2 * np.pi * t[:, None] + [0.0, 1.0, 2.0])
-    >>> FourierFeatures().fit_transform([(t, u)])[0, 0].round(3)
-    array([0., 1., 2.])
+    >>> phase, amplitude, frequency = FourierFeatures().fit_transform([(t, u)])[0]
+    >>> (phase - phase[0]).round(2), frequency.round(3)
+    (array([0., 1., 2.]), array([1., 1., 1.]))
     """
 
     def __init__(
