@@ -89,8 +89,8 @@ def test_classes_by_other_classifiers_have_the_same_names(classifier: Classifier
 
 
 def test_hdbscan_may_leave_all_runs_without_a_class() -> None:
-    points = np.random.default_rng(0).random((12, 3))
-    found = classify(points, np.full(12, Status.DONE), classifier="hdbscan", cuts=(3,))
+    points = np.random.default_rng(0).random((4, 3))
+    found = classify(points, np.full(4, Status.DONE), classifier="hdbscan", cuts=(3,))
     assert found.cuts[3].names == ()
     assert (found.cuts[3].labels == -1).all()
 
