@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 
-
 _NODES = ("node", "link", "triangle")
 """Dimensions along which a run has signals."""
 
