@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """Outcome of one point; 1-3 are results, 4-9 failures, 255 means that it never ran."""
+    """Outcome of one point; 1-3 are results, 4-10 failures, 255 means that it never ran."""
 
     DONE = 1
     STEADY = 2
@@ -17,6 +17,7 @@ class Status(IntEnum):
     TIME_OUT = 7
     WORKER_LOST = 8
     OUT_OF_MEMORY = 9
+    NOT_STARTED = 10
     NEVER = 255
 
     @property
@@ -38,7 +39,7 @@ class Status(IntEnum):
     @property
     def is_failure(self) -> bool:
         """Whether the point was tried and gave no result."""
-        return Status.NON_FINITE <= self <= Status.OUT_OF_MEMORY
+        return Status.NON_FINITE <= self <= Status.NOT_STARTED
 
 
 _HANG = (
@@ -56,5 +57,7 @@ _SENTENCES = {
     Status.TIME_OUT: "time-out: integrator.time_out seconds of wall time were used up",
     Status.WORKER_LOST: "worker lost: the process that computed it died every time",
     Status.OUT_OF_MEMORY: "out of memory: the process that computed it ran into its memory limit",
+    Status.NOT_STARTED: "not started: a point before it in its chain failed, so there is no state "
+    "to start from",
     Status.NEVER: "never run",
 }

@@ -18,6 +18,7 @@ from chimera_hpc.job.parameters import DELTA, SEED
 from chimera_hpc.job.reading import apply_overrides
 from chimera_hpc.job.selection import parse_selection
 from chimera_hpc.job.shipped import job_file
+from chimera_hpc.job.states import check_states
 from chimera_hpc.job.tables import Slurm
 from chimera_hpc.run.choice import CLUSTERS, ExecutorChoice
 from chimera_hpc.run.fork_server import start_fork_server
@@ -221,6 +222,7 @@ def load_job(job: Path, overrides: Sequence[str], block: int | None = None) -> S
             check_user_model(sweep, points.row(i))
     elif sweep.network is not None and not job.is_dir():
         try_networks(sweep)
+    check_states(sweep)
     if sweep.reduction.show or sweep.reduction.replay:
         from chimera_hpc.reduction.selection import check_selections
 

@@ -34,6 +34,9 @@ def execute(args: Namespace) -> int:
         print(f"network     {sweep.network.kind}; {_coupling(sweep)}")
     print(f"axes        {', '.join(need.axes)}")
     print(f"points      {need.points} in {need.cells} cells")
+    if (chains := sweep.continue_) is not None:
+        way = "both ways" if chains.direction == "both" else chains.direction
+        print(f"chains      {need.blocks} of {need.block} points along {chains.along}, {way}")
     print(f"blocks      {need.blocks} of up to {need.block} points")
     print(f"files       {need.files}")
     print(f"store       {in_bytes(need.bytes)} at most")

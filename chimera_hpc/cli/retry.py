@@ -27,8 +27,9 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep retry results/quickstart --status non_finite,step_too_small \\
       --set run.attempts=5 --set run.tighten=0.01
 
-Statuses: non_finite, step_too_small, step_budget, time_out, worker_lost, out_of_memory. Each failed
-point is computed once; what fails again stays failed, results are never touched. --time-out and
+Statuses: non_finite, step_too_small, step_budget, time_out, worker_lost, out_of_memory, not_started
+(behind a failed point of a chain; done together with that point). Each failed point is computed
+once; what fails again stays failed, results are never touched. --time-out and
 --max-steps hold for this run in place of the sweep's own limits: they decide how far a point gets,
 not its numbers.
 """

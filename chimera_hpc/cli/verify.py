@@ -120,7 +120,7 @@ def _different(
     from chimera_hpc.run.block import run_block
 
     points: Points = store.points[chosen]
-    made = run_block(store.sweep, points)
+    made = run_block(store.sweep, points, starts=store.starts(chosen))
     found = digests(made.features, made.scalars)
     wrong = np.flatnonzero(found != ledger["digest"][chosen])
     different = []

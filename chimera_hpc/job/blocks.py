@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from chimera_hpc.job.chains import chain_length
 from chimera_hpc.job.spec import Sweep
 
 SHARD_BYTES = 32 * 10**6
@@ -20,8 +21,11 @@ def block_size(sweep: Sweep, n_points: int) -> int:
     """Return the points per block: run.block, or a number chosen from the cost of the sweep.
 
     The number is chosen so that the block's series fit in one shard, its work takes about
-    `BLOCK_SECONDS`, and the sweep has at least `LEAST_BLOCKS` blocks.
+    `BLOCK_SECONDS`, and the sweep has at least `LEAST_BLOCKS` blocks. With [continue], a block is a
+    chain.
     """
+    if sweep.continue_ is not None:
+        return chain_length(sweep)
     by_shard = SHARD_BYTES / max(1.0, series_bytes(sweep))
     by_work = BLOCK_SECONDS / point_seconds(sweep)
     size = sweep.run.block or min(by_shard, by_work, -(-n_points // LEAST_BLOCKS))
@@ -36,7 +40,8 @@ def point_seconds(sweep: Sweep) -> float:
     """
     tolerance: float = max(1.0, (1e-3 / sweep.integrator.rtol) ** 0.2)
     variables = (1 + sweep.n_observed / 4) / 2 if sweep.integrator.form == "full" else 1.0
-    nodes_time = sweep.n_observed * sweep.integrator.t_end
+    settle = 0.0 if sweep.continue_ is None else sweep.continue_.settle
+    nodes_time = sweep.n_observed * (settle + sweep.integrator.t_end)
     return _NODE_TIME_SECONDS * nodes_time * tolerance * variables
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -17,7 +16,7 @@ from pydantic import (
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.networks import KINDS
-from chimera_hpc.job.table import Line, Table, as_tuple
+from chimera_hpc.job.table import Line, Table, as_tuple, found_in
 from chimera_hpc.network.complex import SIGNALS
 from chimera_hpc.network.sweep_network import RING, read_file
 
@@ -61,9 +60,7 @@ class NetworkTable(Table):
         name = given.get("file") if isinstance(given, dict) else None
         if not isinstance(name, str) or given.get("kind") != "file" or given.get("digest"):
             return given
-        folders = getattr(info.context, "folders", ())
-        places = [Path(folder, name) for folder in (*folders, "")]
-        path = next((place for place in places if place.is_file()), places[0]).absolute()
+        path = found_in(name, info.context)
         try:
             network, digest = read_file(path)
             if given.get("triangles", "none") == "cliques":

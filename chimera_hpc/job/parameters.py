@@ -11,6 +11,9 @@ from chimera_hpc.models.parameters import Parameter
 
 SEED = Parameter("seed", int, None, "Number of the random initial state.", low=0, high=2**63 - 1)
 SEED_COUNT = Parameter("seeds", int, None, "Number of seeds.", low=1, high=10**9)
+DIRECTION = Parameter(
+    "direction", int, None, "Direction along the chain: 1 forward, -1 backward.", low=-1, high=1
+)
 DELTA = Parameter("delta", float, None, "Radius of the ball of initial states.", low=0)
 
 

@@ -40,8 +40,8 @@ def job_schema() -> dict[str, Any]:
         "anyOf": [known, _USER_MODEL],
         "description": properties["model"]["description"],
     }
-    network = properties["network"]
-    properties["network"] = {"$ref": network["anyOf"][0]["$ref"]}
+    for table in ("network", "continue"):
+        properties[table] = {"$ref": properties[table]["anyOf"][0]["$ref"]}
     for table in ("grid", "fixed"):
         del properties[table]["additionalProperties"]
         properties[table].pop("default", None)

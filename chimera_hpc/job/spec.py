@@ -29,6 +29,7 @@ from chimera_hpc.base.renaming import with_new_names
 from chimera_hpc.base.wording import short
 from chimera_hpc.job import registry
 from chimera_hpc.job.axes import Axis, Values
+from chimera_hpc.job.chains import axis_names, check_chains, in_chains
 from chimera_hpc.job.checks import (
     Grid,
     axes_of,
@@ -38,10 +39,11 @@ from chimera_hpc.job.checks import (
     complete_fixed,
     parsed,
 )
+from chimera_hpc.job.continue_table import ContinueTable
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.networks import check_sizes, observed_sizes
-from chimera_hpc.job.parameters import DELTA, SEED, fixed_schema, grid_schema
+from chimera_hpc.job.parameters import DELTA, DIRECTION, SEED, fixed_schema, grid_schema
 from chimera_hpc.job.points import DTYPES, Points, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
 from chimera_hpc.job.selection import check_names, check_network_choices
@@ -96,6 +98,9 @@ class Sweep(Table):
         json_schema_extra=fixed_schema(),
     )
     integrator: Integrator = Field(default_factory=Integrator)
+    continue_: ContinueTable | None = Field(
+        None, alias="continue", description="Chains of points that go on from one another."
+    )
     features: Features = Field(default_factory=Features)
     measures: Measures = Field(default_factory=Measures)
     reduction: Reduction = Field(default_factory=Reduction)
@@ -147,11 +152,12 @@ class Sweep(Table):
         try:
             return cls.model_validate(_with_new_names(data), context=origin or Origin())
         except ValidationError as error:
-            raise bad(where, one_line(error, list(cls.model_fields))) from None
+            keys = [field.alias or name for name, field in cls.model_fields.items()]
+            raise bad(where, one_line(error, keys)) from None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, with defaults. `from_dict` is the inverse."""
-        return self.model_dump(mode="json", exclude_none=True)
+        return self.model_dump(mode="json", exclude_none=True, by_alias=True)
 
     @property
     def origin(self) -> Origin:
@@ -226,13 +232,15 @@ class Sweep(Table):
 
     def points(self) -> Points:
         """Return all points. Axes are in order of declaration; the first varies slowest."""
-        axes = self.axes
-        columns = expand(axes)
+        axes, chains = self.axes, self.continue_
+        columns = expand(axes) if chains is None else in_chains(axes, chains)
         n_points = len(columns["seed"])
         model = self.parameters
         single = {**self.fixed, **model.constants, "delta": self.integrator.delta}
         kinds = {p.name: p.kind for p in (*model.parameters, DELTA, SEED)}
         kinds |= dict.fromkeys(model.constants, int)
+        if chains is not None:
+            kinds[DIRECTION.name] = DIRECTION.kind
         return Points(
             {
                 name: columns[name].astype(DTYPES[kind], copy=False)
@@ -240,7 +248,7 @@ class Sweep(Table):
                 else np.full(n_points, single[name], DTYPES[kind])
                 for name, kind in kinds.items()
             },
-            tuple(axes),
+            tuple(axes) if chains is None else axis_names(axes, chains),
         )
 
     @field_validator("model")
@@ -293,6 +301,15 @@ class Sweep(Table):
         check_points(model, axes, self.fixed)
         single = {name: Values((value,)) for name, value in self.fixed.items()}
         check_tables(self.integrator, self.features, model, {**single, **axes})
+        if self.integrator.initial is not None and "delta" in axes:
+            raise BadInput("grid.delta: integrator.initial gives the first states, without a ball")
+        if self.continue_ is not None:
+            check_chains(self.continue_, {**single, **axes}, self.run.block)
+            if self.reduction.replay:
+                raise BadInput(
+                    "reduction.replay: with [continue] a point has no run of its own from t = 0; "
+                    "reduction.show draws runs of the sweep"
+                )
         check_nodes(self.features, self.n_nodes)
         if self.network is not None:
             check_sizes(self.network.kind, self.n_nodes, _values({**single, **axes}))
@@ -338,6 +355,9 @@ def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
         integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
         data["integrator"] = integrator
     # Digests from before these tables existed must not change.
+    if "continue" in spec:
+        data["continue"] = spec["continue"]
+    data["integrator"] = {k: v for k, v in data["integrator"].items() if k != "initial"}
     if "network" in spec:
         data["network"] = {k: v for k, v in spec["network"].items() if k != "file"}
     default = Measures().model_dump(mode="json", exclude_none=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
@@ -13,6 +14,12 @@ Line = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]+$", max_leng
 def as_tuple(value: Any) -> Any:
     """Convert a list (from TOML or JSON) to a tuple, because a frozen value holds no list."""
     return tuple(value) if isinstance(value, list) else value
+
+
+def found_in(name: str, origin: Any) -> Path:
+    """Return the path of a file that a job names: in the folders of its origin, or the current."""
+    places = [Path(folder, name) for folder in (*getattr(origin, "folders", ()), "")]
+    return next((place for place in places if place.is_file()), places[0]).absolute()
 
 
 class Table(BaseModel):

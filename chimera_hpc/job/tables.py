@@ -9,11 +9,14 @@ from pydantic import (
     BeforeValidator,
     Field,
     StringConstraints,
+    ValidationInfo,
     model_validator,
 )
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.continue_table import ContinueTable
+from chimera_hpc.job.initial_file import read_initial
 from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.registry import (
     DEFAULT_PANEL,
@@ -28,7 +31,7 @@ from chimera_hpc.job.selection import (
     check_measures,
     check_selections,
 )
-from chimera_hpc.job.table import Line, Table, as_tuple
+from chimera_hpc.job.table import Line, Table, as_tuple, found_in
 from chimera_hpc.measures.conventions import PRESETS
 
 
@@ -99,8 +102,41 @@ class Integrator(Table):
     ball: Literal["maximum", "euclidean"] = Field(
         "maximum", description="Norm of that ball; maximum: delta * U[-1, 1] for each variable."
     )
+    initial: Line | None = Field(
+        None,
+        description="NumPy file .npz of first states in place of that ball, from the folder of the "
+        "job: arrays u (or phase) and v, (n,) for all points or (seeds, n), row s for seed s.",
+    )
+    initial_digest: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{16}$")] | None = Field(
+        None, description="Digest of that file, which the plan fills in."
+    )
     max_steps: Count = Field(10_000_000, description="Accepted and rejected steps per point.")
     time_out: float = Field(600.0, gt=0, description="Seconds of wall time per point.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_initial(cls, given: Any, info: ValidationInfo) -> Any:
+        """Add path and digest of a file that a job names."""
+        name = given.get("initial") if isinstance(given, dict) else None
+        if not isinstance(name, str) or given.get("initial_digest"):
+            return given
+        path = found_in(name, info.context)
+        try:
+            _, digest = read_initial(path)
+        except BadInput as error:
+            raise BadInput(f"integrator.initial: {error}") from None
+        return {**given, "initial": str(path), "initial_digest": digest}
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """What of the table decides the numbers: all but where a file is."""
+        return self.model_dump(mode="json", exclude={"initial"})
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Integrator) and self.spec == other.spec
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.spec.items()))
 
 
 class Features(Table):
@@ -326,6 +362,7 @@ class Slurm(Table):
 TABLES: dict[str, type[Table]] = {
     "network": NetworkTable,
     "integrator": Integrator,
+    "continue": ContinueTable,
     "features": Features,
     "measures": Measures,
     "reduction": Reduction,

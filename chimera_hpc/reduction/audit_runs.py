@@ -138,7 +138,7 @@ def compute_piece(path: Path, chosen: Integers, way: str) -> Computed:
 
     store = Store.open(path)
     sweep, nudge = variant(store.sweep, way)
-    made = run_block(sweep, store.points[chosen], nudge=nudge)
+    made = run_block(sweep, store.points[chosen], nudge=nudge, starts=store.starts(chosen))
     return Computed(made.status, made.scalars, made.steps)
 
 

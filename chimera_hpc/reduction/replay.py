@@ -76,7 +76,8 @@ def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
         stored = np.empty(u.shape[::-1], dtype=store.sweep.keep.dtype)
         signals[row] = store_as(u, stored, np.empty(u.shape)).T.copy(), w.T.copy()
 
-    made = run_block(store.sweep, store.points[which], on_signals=keep)
+    starts = store.starts(which)
+    made = run_block(store.sweep, store.points[which], on_signals=keep, starts=starts)
     ledger, names, times = store.ledger(), classes_of(store), sample_times(store.sweep)
     found = digests(made.features, made.scalars)
     return [

@@ -104,19 +104,19 @@ def series_of(store: Store, i: int) -> Array:
     """Return the series (T, N) of a point; it is computed again where it is not kept."""
     if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
         return store.series(i)
-    return _integrate(store.sweep, store.points[i : i + 1])[0]
+    return _integrate(store.sweep, store.points[i : i + 1], store.starts([i]))[0]
 
 
 def _place(row: Mapping[str, int | float], axes: Sequence[FreeAxis]) -> str:
     return ", ".join(filter(None, [describe(row, axes, math=True), f"seed {row['seed']}"]))
 
 
-def _integrate(sweep: Sweep, points: Points) -> tuple[Array, Status]:
+def _integrate(sweep: Sweep, points: Points, starts: Array | None = None) -> tuple[Array, Status]:
     """Compute one point as a task does; return its series (T, N) and its status."""
     from chimera_hpc.run.block import run_block
 
     keep = Keep(series="all", dtype="float32")
-    result = run_block(sweep.model_copy(update={"keep": keep}), points)
+    result = run_block(sweep.model_copy(update={"keep": keep}), points, starts=starts)
     series: NDArray[Any] | None = result.series
     assert series is not None
     return series[0].astype(np.float64), Status(int(result.status[0]))

@@ -164,7 +164,8 @@ def _replay(content: Content, points: NDArray[np.int64]) -> Array:
 
     sweep = content.store.sweep
     sweep = sweep.model_copy(update={"keep": Keep(series="all", dtype="float32")})
-    series = run_block(sweep, content.store.points[points]).series
+    store = content.store
+    series = run_block(sweep, store.points[points], starts=store.starts(points)).series
     if series is None:
         raise BadInput(f"{content.store.path}: the model gives no series to draw")
     return np.asarray(series, dtype=np.float64)

@@ -24,6 +24,7 @@ from chimera_hpc.measures.fourier import NodeFeatures, measure_signals
 from chimera_hpc.measures.measure import Measure, MeasuredRun
 from chimera_hpc.measures.quality import quality
 from chimera_hpc.measures.series import by_node, quantise, round_to
+from chimera_hpc.models.network_model import PhaseModel
 from chimera_hpc.models.protocol import Model
 from chimera_hpc.network.sweep_network import pairs_of
 from chimera_hpc.run.initial_state import initial_state
@@ -46,6 +47,7 @@ def run_block(
     on_signals: OnSignals | None = None,
     lanes: int | None = None,
     nudge: float = 0.0,
+    starts: Array | None = None,
 ) -> BlockResult:
     """Integrate the points and measure their series.
 
@@ -61,9 +63,11 @@ def run_block(
         kept.
     lanes: lanes of the stepping loop; chosen from the work by default.
     nudge: how far initial states are moved (see `initial_state`); 0 for a sweep's own points.
+    starts (n, variables): states, u then v, in place of the points' own initial states, as
+        `Store.starts` gives them for chains; NaN where a point has its own.
     """
     watchdog.watch(sweep)
-    block = _Block(sweep, points, on_signals, nudge)
+    block = _Block(sweep, points, on_signals, nudge, starts)
     with suppress(Stopped):
         for rows in _lane_groups(block.models):
             factor = 1.0
@@ -120,22 +124,31 @@ class _Block:
     """Models, initial states and the result that the runs fill."""
 
     def __init__(
-        self, sweep: Sweep, points: Points, on_signals: OnSignals | None, nudge: float = 0.0
+        self,
+        sweep: Sweep,
+        points: Points,
+        on_signals: OnSignals | None,
+        nudge: float = 0.0,
+        starts: Array | None = None,
     ) -> None:
         n, times = len(points), sample_times(sweep)
         self.sweep, self.times, self.on_signals = sweep, times, on_signals
         rows = self.rows = [points.row(i) for i in range(n)]
         self.axes = points.axes
         self.models, self.initial = [], []
-        for row in rows:
+        self.settle = 0.0 if sweep.continue_ is None else sweep.continue_.settle
+        for i, row in enumerate(rows):
+            own = starts is None or bool(np.isnan(starts[i]).all())
             with foreign_code():
                 model = build(sweep, row)
                 self.models.append(model)
-                self.initial.append(initial_state(sweep, row, model, nudge))
+                start = None if own or starts is None else starts[i]
+                self.initial.append(initial_state(sweep, row, model, nudge, start))
         self.options = sweep.features.options()
         self.panel = measures(sweep.measures.panel)
         self.keeps = series_mask(sweep, points.columns["seed"])
-        self.result = empty_result(sweep, n)
+        width = max(model.n_nodes + model.n_second for model in self.models)
+        self.result = empty_result(sweep, n, width if starts is None else starts.shape[1])
         # Of the run being measured: u as stored, u and w node by node.
         shape = (sweep.n_observed, len(times))
         self.u, self.w = np.empty(shape), np.empty(shape)
@@ -155,8 +168,8 @@ class _Block:
             return []
         spec = self.sweep.integrator
         control = Control(
-            t_end=spec.t_end,
-            start=float(self.times[0]),
+            t_end=self.settle + spec.t_end,
+            start=self.settle + float(self.times[0]),
             step=spec.t_step,
             rtol=spec.rtol * factor,
             atol=spec.atol * factor,
@@ -204,6 +217,9 @@ class _Block:
             if stored is not kept:
                 kept[:, : model.n_nodes] = stored
         w = by_node(w, self.w[: model.n_nodes])
+        if result.state is not None:
+            last = _carried(model, *self.last(row, outcome.y_end))
+            result.state[row, : len(last)] = last
         features = self.features(u)
         result.status[row] = features.status
         result.n_windows[row] = features.n_windows
@@ -232,6 +248,12 @@ class _Block:
         run = MeasuredRun(self.times, u, w, features, self.sweep.features, distance, pairs)
         return _measure(self.panel, run)
 
+    def last(self, row: int, y_end: Array) -> tuple[Array, Array]:
+        """Return the last state (u, v) of a run."""
+        model, t_end = self.models[row], self.settle + self.sweep.integrator.t_end
+        v0, times = self.initial[row][1], np.array([t_end])
+        return y_end[: model.n_nodes], model.second_variable(y_end[:, None], v0, times)[0]
+
     def distance(self, row: int, y_end: Array) -> float:
         """Distance of the last state (u, v) from the centre of the ball of initial states.
 
@@ -239,12 +261,21 @@ class _Block:
         """
         model, spec = self.models[row], self.sweep.integrator
         u, v = model.equilibrium(spec.centre)
-        t_end = np.array([spec.t_end])
-        second = model.second_variable(y_end[:, None], self.initial[row][1], t_end)[0]
-        offset = np.concatenate([y_end[: model.n_nodes] - u, second - v])
+        first, second = self.last(row, y_end)
+        offset = np.concatenate([first - u, second - v])
         if spec.ball == "maximum":
             return float(np.abs(offset).max())
         return float(np.sqrt(np.sum(offset * offset)))
+
+
+def _carried(model: Model, u: Array, v: Array) -> Array:
+    """Return a last state as one array, u then v, to start another run from.
+
+    Phases come back to [-pi, pi]: they would grow along a chain, and the tolerance with them.
+    """
+    if isinstance(model, PhaseModel):
+        u = np.angle(np.exp(1j * u))
+    return np.concatenate([u, v])
 
 
 def _measure(panel: list[Measure], run: MeasuredRun) -> Array:

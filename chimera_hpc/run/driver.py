@@ -20,7 +20,7 @@ from chimera_hpc.run.signals import StopRequest
 from chimera_hpc.run.slurm.walltime import NEAR, time_to_leave
 from chimera_hpc.run.watchdog import watchdog
 from chimera_hpc.store.claims import live_claims
-from chimera_hpc.store.ledger import RESULTS, unfinished
+from chimera_hpc.store.ledger import RESULTS, unfinished, with_those_behind
 from chimera_hpc.store.provenance import differences, gather
 from chimera_hpc.store.runs import BlockWork
 
@@ -112,6 +112,7 @@ class Driver:
         """Have the reporter count what the ledger says, by whichever run."""
         retry, ledger = self.retry, self.store.ledger()
         to_do = unfinished(ledger, retry.attempts, retry.statuses, retry.before)
+        to_do = with_those_behind(to_do, ledger["status"], self.store.block_size)
         failed = ~to_do & (ledger["status"] > max(RESULTS))
         self.reporter.count(int((~to_do).sum()), int(failed.sum()))
 

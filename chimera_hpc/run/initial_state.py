@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.streams import initial_stream, initial_stream_on_network, stream_key
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.initial_file import initial_file
 from chimera_hpc.job.user_models import prints_to_stderr
 from chimera_hpc.models.custom import OwnPoint
 from chimera_hpc.models.protocol import Model, Row
@@ -15,8 +16,12 @@ from chimera_hpc.network.sweep_network import network_of
 Array = NDArray[np.float64]
 
 
-def initial_state(sweep: Sweep, row: Row, model: Model, nudge: float = 0.0) -> tuple[Array, Array]:
-    """Draw the initial state (u, v) of a point.
+def initial_state(
+    sweep: Sweep, row: Row, model: Model, nudge: float = 0.0, start: Array | None = None
+) -> tuple[Array, Array]:
+    """Return the initial state (u, v) of a point: `start`, u then v, else that of the job's file.
+
+    Without both it is drawn.
 
     Uniform in the ball of radius ``delta`` around ``integrator.centre``: in the maximum norm every
     variable is ``centre + delta * U[-1, 1]``, u first, then v (paper sec. Method and results). In
@@ -29,9 +34,22 @@ def initial_state(sweep: Sweep, row: Row, model: Model, nudge: float = 0.0) -> t
     stream = _stream(sweep, row)
     with prints_to_stderr():
         drawn = model.draw(stream) if isinstance(model, OwnPoint) else None
+    drawn = _given(sweep, row, model, start) or drawn
     if drawn is None:
         drawn = _in_the_ball(sweep, row, model, stream)
     return (_moved(drawn[0], nudge, stream), _moved(drawn[1], nudge, stream)) if nudge else drawn
+
+
+def _given(sweep: Sweep, row: Row, model: Model, start: Array | None) -> tuple[Array, Array] | None:
+    """Return the state that is not drawn, if there is one."""
+    if start is not None:
+        return start[: model.n_nodes], start[model.n_nodes : model.n_nodes + model.n_second]
+    file, digest = sweep.integrator.initial, sweep.integrator.initial_digest
+    if file is None or digest is None:
+        return None
+    states, seed = initial_file(file, digest), int(row["seed"])
+    states.check((model.n_nodes, model.n_second), seed)
+    return states.state(seed)
 
 
 def _stream(sweep: Sweep, row: Row) -> np.random.Generator:

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from chimera_hpc.base.files import HOPELESS
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points
 from chimera_hpc.run.block import DoesNotFit, run_block
+from chimera_hpc.run.chain import Chain
 from chimera_hpc.run.messages import BlockError, BlockReceipt, RunMessage, tell_to_stop
 from chimera_hpc.run.slurm import walltime
 from chimera_hpc.run.watchdog import limit_of
@@ -124,6 +126,7 @@ class _Block:
         self.sweep = message.retry.applied(self.store.sweep)
         self.n_done = self.n_failed = 0
         self.error: BlockError | None = None
+        self.chain: Chain | None = None
 
     def do(self) -> BlockReceipt:
         began = time.perf_counter()
@@ -151,6 +154,8 @@ class _Block:
         """Return which points of the store are to be done, as far as one sees without a claim."""
         retry = self.message.retry
         rows = self.store.points_to_do(self.block, retry.attempts, retry.statuses, retry.before)
+        if self.store.n_state:
+            rows = rows[:1]  # a chain goes on where it was broken off
         return self.store.block(self.block)[0] + rows
 
     @contextmanager
@@ -176,6 +181,8 @@ class _Block:
         retry = self.message.retry
         rows = self.store.points_to_do(self.block, retry.attempts, retry.statuses, retry.before)
         together, alone = _tries_together(self._deaths(claim))
+        if self.store.n_state:
+            return self._work_along(claim, rows, together, alone)
         groups = _pieces(rows, 1 if alone else max(1, len(rows)))
         while groups:
             group = groups.pop(0)
@@ -191,6 +198,35 @@ class _Block:
                 return False
         return True
 
+    def _work_along(self, claim: Claim, rows: Rows, together: int, alone: bool) -> bool:
+        """Do points of a chain one after the other; return whether all of them were reached."""
+
+        def write(result: BlockResult, tries: int, rows: Rows) -> None:
+            self._write(claim, result, tries, rows)
+
+        self.chain = chain = Chain(self.store, self.block, write)
+        if chain.is_damaged:
+            rows = np.arange(len(chain.states))
+        reached = True
+        for row in rows.tolist():
+            point, tries = np.array([row]), together + 1
+            if chain.is_cut(row):
+                result: BlockResult | None = self._none(self._points(point), Status.NOT_STARTED)
+            elif alone:
+                result, tries = self._compute_alone(claim, point, together)
+            else:
+                result = self._compute(point, claim)
+            assert result is not None
+            chain.take(row, result, tries)
+            if result.status[0] == Status.NEVER:
+                reached = not self.stop()
+                break
+        chain.flush()
+        return reached
+
+    def _none(self, points: Points, status: Status) -> BlockResult:
+        return failed_block(self.sweep, points, status, self.store.n_state)
+
     def _write(self, claim: Claim, result: BlockResult, tries: int, rows: Rows) -> None:
         receipt = self.store.write_block(self.block, result, self.message.run, tries, claim, rows)
         self.n_done += receipt.n_done
@@ -203,12 +239,15 @@ class _Block:
             return not all([claim.refresh() for claim in claims]) or self.stop()
 
         points = self._points(rows)
+        start: dict[str, Any] = {}
+        if self.chain is not None:
+            start = {"starts": self.chain.starts(int(rows[0]))}
         try:
-            return run_block(self.sweep, points, should_stop=should_stop)
+            return run_block(self.sweep, points, should_stop=should_stop, **start)
         except MemoryError:
             if len(rows) > 1:
                 return None
-            return failed_block(self.sweep, points, Status.OUT_OF_MEMORY)
+            return self._none(points, Status.OUT_OF_MEMORY)
         except (OSError, DoesNotFit):
             raise
         except Exception as error:
@@ -217,7 +256,7 @@ class _Block:
                 return None
             where = " ".join(f"{name}={points.row(0)[name]}" for name in points.axes)
             self.error = self.error or _block_error(f"point {where}: {_in_a_line(error)}")
-            return failed_block(self.sweep, points, Status.NEVER)
+            return self._none(points, Status.NEVER)
 
     def _compute_alone(
         self, claim: Claim, rows: Rows, before: int
@@ -239,12 +278,12 @@ class _Block:
     def _failed(self, points: Points, death: LostAttempt) -> BlockResult:
         """Return the result of a point that its workers died of."""
         if death.no_return:
-            result = failed_block(self.sweep, points, Status.TIME_OUT)
+            result = self._none(points, Status.TIME_OUT)
             result.elapsed_us[:] = int(1e6 * limit_of(self.sweep))
             return result
         memory = death.out_of_memory
         status = Status.OUT_OF_MEMORY if memory else Status.WORKER_LOST
-        return failed_block(self.sweep, points, status)
+        return self._none(points, status)
 
     def _points(self, rows: Rows) -> Points:
         return self.store.points[self.store.block(self.block)[0] + rows]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ class BlockResult:
     quality (n, 2): along axis 1 `schema.QUALITY`; NaN unless the point is DONE.
     steps, elapsed_us, n_windows (n,): accepted steps, share of the wall time in microseconds,
         Fourier windows.
+    state (n, variables): with [continue] the last state, u then v, from which the next point of the
+        chain starts; NaN unless the point has a result, and beyond its variables.
     series (n, T, N0): u on the analysis interval as it is stored; None when the sweep keeps none.
     """
 
@@ -39,17 +42,30 @@ class BlockResult:
     elapsed_us: NDArray[np.int64]
     n_windows: NDArray[np.int64]
     series: NDArray[Any] | None
+    state: Array | None = None
 
 
-def failed_block(sweep: Sweep, points: Points, status: Status) -> BlockResult:
+def failed_block(sweep: Sweep, points: Points, status: Status, n_state: int = 0) -> BlockResult:
     """Return the result of points that could not be computed at all, for the reason ``status``."""
-    result = empty_result(sweep, len(points))
+    result = empty_result(sweep, len(points), n_state)
     result.status[:] = status
     return result
 
 
-def empty_result(sweep: Sweep, n: int) -> BlockResult:
-    """Return the result of n points none of which was reached."""
+def joined(results: Sequence[BlockResult]) -> BlockResult:
+    """Return the results of several lists of points as one."""
+    columns: dict[str, Any] = {}
+    for name in (field.name for field in fields(BlockResult)):
+        parts = [getattr(result, name) for result in results]
+        columns[name] = None if parts[0] is None else np.concatenate(parts)
+    return BlockResult(**columns)
+
+
+def empty_result(sweep: Sweep, n: int, n_state: int = 0) -> BlockResult:
+    """Return the result of n points none of which was reached.
+
+    n_state: values of a state, with [continue].
+    """
     series = None
     if sweep.keep.series != "none":
         missing = MISSING if sweep.keep.dtype == "int16" else np.nan
@@ -64,4 +80,5 @@ def empty_result(sweep: Sweep, n: int) -> BlockResult:
         elapsed_us=np.zeros(n, dtype=np.int64),
         n_windows=np.zeros(n, dtype=np.int64),
         series=series,
+        state=None if sweep.continue_ is None else np.full((n, n_state), np.nan),
     )

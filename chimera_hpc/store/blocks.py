@@ -60,10 +60,19 @@ class BlockFiles:
 
     @classmethod
     def of(
-        cls, path: Path, sweep: Sweep, block_size: int, without: Collection[str] = ()
+        cls,
+        path: Path,
+        sweep: Sweep,
+        block_size: int,
+        without: Collection[str] = (),
+        n_state: int = 0,
     ) -> BlockFiles:
-        """Return the files of a sweep's store, which lacks the arrays `without`."""
-        plans = {plan.name: plan for plan in block_plans(sweep, block_size, block_size)}
+        """Return the files of a sweep's store, which lacks the arrays `without`.
+
+        n_state: width of the array `state`.
+        """
+        planned = block_plans(sweep, block_size, block_size, n_state=n_state)
+        plans = {plan.name: plan for plan in planned}
         names = [name for name in BLOCK_ARRAYS if name in plans and name not in without]
         shapes = {name: plans[name].chunks for name in names}
         return cls(path, shapes, sweep.keep.dtype)

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import sync_tree, write_atomically
 from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.chains import followed
+from chimera_hpc.job.states import largest_state
 from chimera_hpc.job.together import point_keys, points_of
 from chimera_hpc.store.claims import claim_block
 from chimera_hpc.store.ledger import METADATA
@@ -27,7 +29,7 @@ _EXPIRY = 20.0
 """Seconds after which a change by another machine counts as broken off; it takes one or two."""
 _PATIENCE = 30.0
 """Seconds to wait for others."""
-SAME_TABLES = ("model", "network", "integrator", "features", "keep")
+SAME_TABLES = ("model", "network", "integrator", "continue_", "features", "keep")
 """What the points of one store have in common."""
 
 
@@ -104,10 +106,15 @@ def repair_metadata(path: Path, root: Mapping[str, Any], sweep: Sweep, points: P
 def check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> None:
     """Raise BadInput unless `sweep` holds all points of a store and differs in its axes only."""
     changed = [name for name in SAME_TABLES if getattr(sweep, name) != getattr(before, name)]
+    changed = [name.rstrip("_") for name in changed]
     if sweep.n_nodes != before.n_nodes:
         changed.append("fixed.n_nodes")
     elif sweep.n_observed != before.n_observed:
         changed.append(f"the largest number of {sweep.signals}")
+    elif followed(sweep) != followed(before):
+        changed.append("the axis of the chains")
+    elif largest_state(sweep) != largest_state(before):
+        changed.append("the largest number of variables")
     if changed:
         raise BadInput(f"{path}: an extension may change axes only, not {', '.join(changed)}")
     new = sweep.points()

@@ -176,6 +176,16 @@ def unfinished(
     return np.asarray((status == Status.NEVER) | again)
 
 
+def with_those_behind(
+    to_do: NDArray[np.bool_], status: NDArray[np.int64], block_size: int
+) -> NDArray[np.bool_]:
+    """Add to the points to be run those of a chain that were not started and lie behind them."""
+    place = np.arange(len(to_do))
+    last = np.maximum.accumulate(np.where(to_do, place, -1))
+    behind = (last >= 0) & (last // block_size == place // block_size)
+    return np.asarray(to_do | (behind & (status == Status.NOT_STARTED)))
+
+
 def canonical(values: ArrayLike) -> NDArray[np.float64]:
     """Return a little-endian, contiguous copy with every NaN the same NaN, as it is stored."""
     copy = np.array(values, dtype="<f8", order="C")

@@ -17,6 +17,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
+from chimera_hpc.job.chains import followed
 from chimera_hpc.job.together import point_keys, points_of
 from chimera_hpc.store.blocks import BlockFiles
 from chimera_hpc.store.extend import SAME_TABLES
@@ -114,7 +115,8 @@ class _Merge:
 
     def copy_blocks(self, path: Path, sweep: Sweep) -> None:
         size = self.stores[0].block_size
-        files = BlockFiles.of(path, sweep, size)
+        n_state = self.stores[0].n_state
+        files = BlockFiles.of(path, sweep, size, n_state=n_state)
         for block in range(-(-len(self.source) // size)):
             source = self.source[block * size : (block + 1) * size]
             if (source >= 0).any():
@@ -139,11 +141,17 @@ class _Merge:
 
 
 def _check_alike(first: Store, other: Store) -> None:
-    differ = [t for t in SAME_TABLES if getattr(first.sweep, t) != getattr(other.sweep, t)]
+    differ = [
+        t.rstrip("_") for t in SAME_TABLES if getattr(first.sweep, t) != getattr(other.sweep, t)
+    ]
     if first.sweep.n_nodes != other.sweep.n_nodes:
         differ.append("fixed.n_nodes")
     elif first.sweep.n_observed != other.sweep.n_observed:
         differ.append(f"the largest number of {first.sweep.signals}")
+    elif followed(first.sweep) != followed(other.sweep):
+        differ.append("the axis of the chains")
+    elif first.n_state != other.n_state:
+        differ.append("the largest number of variables")
     if differ:
         raise BadInput(
             f"{other.path}: differs from {first.path} in {', '.join(differ)}; "

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.axes import Values
-from chimera_hpc.job.parameters import DELTA, SEED
+from chimera_hpc.job.parameters import DELTA, DIRECTION, SEED
 from chimera_hpc.job.registry import measures
+from chimera_hpc.job.states import largest_state
 from chimera_hpc.store.ledger import FIELDS
 
-BLOCK_ARRAYS = ("u", "features", "scalars", "quality", "ledger")
+BLOCK_ARRAYS = ("u", "features", "scalars", "quality", "state", "ledger")
 """Arrays with one chunk per block, in the order in which a block is written."""
 OPTIONAL = frozenset({"quality"})
 """Block arrays that a store may lack: versions before 0.2 did not plan them."""
@@ -122,7 +123,7 @@ def array_plans(
     n_points = len(next(iter(columns.values())))
     others = [_coordinate(sweep, name, column) for name, column in columns.items()]
     names = " ".join(columns)
-    return (*others, *block_plans(sweep, n_points, block_size, names))
+    return (*others, *block_plans(sweep, n_points, block_size, names, largest_state(sweep)))
 
 
 def room(sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int) -> Room:
@@ -136,9 +137,12 @@ def room(sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int) -> 
 
 
 def block_plans(
-    sweep: Sweep, n_points: int, block_size: int, coordinates: str = ""
+    sweep: Sweep, n_points: int, block_size: int, coordinates: str = "", n_state: int = 0
 ) -> list[ArrayPlan]:
-    """Return the arrays with one chunk per block, and `time` before them where series are kept."""
+    """Return the arrays with one chunk per block, and `time` before them where series are kept.
+
+    n_state: width of the array `state`, which sweeps with [continue] have.
+    """
 
     def plan(
         name: str, others: tuple[tuple[str, int], ...], dtype: str, fill: float, **attributes: Any
@@ -191,6 +195,9 @@ def block_plans(
             status_meanings=[code.sentence for code in Status],
         ),
     ]
+    if sweep.continue_ is not None:
+        text = "state (u, v) from which the next point of the chain starts"
+        tables.append(plan("state", (("variable", n_state),), "float64", math.nan, long_name=text))
     if sweep.keep.series == "none":
         return tables
     times = sample_times(sweep)
@@ -203,6 +210,14 @@ def block_plans(
         **_series_attributes(sweep),
     )
     return [_time(times), series, *tables]
+
+
+def state_width(nodes: Mapping[str, Any]) -> int:
+    """Return the width of the array `state` by the metadata of a store; 0 if there is none."""
+    try:
+        return int(nodes["state"]["shape"][1])
+    except (KeyError, TypeError, ValueError, IndexError):
+        return 0
 
 
 def _series_attributes(sweep: Sweep) -> dict[str, Any]:
@@ -224,7 +239,9 @@ def _time(times: NDArray[np.float64]) -> ArrayPlan:
 
 
 def _coordinate(sweep: Sweep, name: str, column: NDArray[Any]) -> ArrayPlan:
-    known = {"seed": SEED, "delta": DELTA}.get(name) or sweep.parameters.find(name)
+    known = {"seed": SEED, "delta": DELTA, "direction": DIRECTION}.get(
+        name
+    ) or sweep.parameters.find(name)
     attributes = {"units": "1", "long_name": known.text.rstrip(".") if known else name}
     integer = column.dtype.kind == "i"
     kind, fill = ("int64", 0) if integer else ("float64", math.nan)

@@ -32,11 +32,12 @@ from chimera_hpc.store.ledger import (
     scan_ledger,
     table_columns,
     unfinished,
+    with_those_behind,
 )
 from chimera_hpc.store.read import check_has_run, gather, read_series
 from chimera_hpc.store.reduction import StoredReduction, Variable, read_reduction, write_reduction
 from chimera_hpc.store.runs import start_run
-from chimera_hpc.store.schema import OPTIONAL, QUALITY, scalar_labels, series_mask
+from chimera_hpc.store.schema import OPTIONAL, QUALITY, scalar_labels, series_mask, state_width
 from chimera_hpc.store.strips import StoredSeries
 from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
 from chimera_hpc.store.write import Receipt, write_block
@@ -62,7 +63,9 @@ class Store:
         self.sweep = sweep
         self.n_points, self.block_size = ledger_shape(metadata)
         nodes = metadata["consolidated_metadata"]["metadata"]
-        self.files = BlockFiles.of(path, sweep, self.block_size, OPTIONAL - set(nodes))
+        self.files = BlockFiles.of(
+            path, sweep, self.block_size, OPTIONAL - set(nodes), state_width(nodes)
+        )
 
     @classmethod
     def plan(cls, path: str | Path, sweep: Sweep) -> Self:
@@ -90,6 +93,11 @@ class Store:
     @property
     def n_blocks(self) -> int:
         return -(-self.n_points // self.block_size)
+
+    @property
+    def n_state(self) -> int:
+        """Values of the array `state` per point; 0 for a sweep without [continue]."""
+        return self.files.shapes["state"][1] if "state" in self.files.shapes else 0
 
     def block(self, i: int) -> tuple[int, int]:
         """Return the first point of block i and the one after its last."""
@@ -224,7 +232,8 @@ class Store:
         if table is None or shallow_damage(self.files, i):
             return np.arange(stop - start)
         columns = table_columns(table[: stop - start])
-        return np.flatnonzero(unfinished(columns, attempts, statuses, before))
+        to_do = unfinished(columns, attempts, statuses, before)
+        return np.flatnonzero(with_those_behind(to_do, columns["status"], self.block_size))
 
     def find_damaged(self, deep: bool = False, patience: float = 0.0) -> list[Damage]:
         """Return the damaged chunks, by presence and length or, if `deep`, decoding every byte.
@@ -341,6 +350,20 @@ class Store:
     def _check_series(self, i: int) -> None:
         if not series_mask(self.sweep, self.points.columns["seed"][i : i + 1]).all():
             raise BadInput(f"{self.path}: the series of point {i} is not kept")
+
+    def starts(self, chosen: Sequence[int] | NDArray[np.int64]) -> NDArray[np.float64] | None:
+        """Return the states that points start from, shape (len(chosen), variables).
+
+        NaN for the first point of a chain, which has a first state of its own, and behind a point
+        without a state. None for a sweep without [continue]. Raises DamagedChunk.
+        """
+        if not self.n_state:
+            return None
+        found = np.full((len(chosen), self.n_state), np.nan)
+        for row, (block, place) in enumerate(divmod(int(i), self.block_size) for i in chosen):
+            if place and read_block(self.path, block, self.block_size) is not None:
+                found[row] = self.files.read("state", block)[place - 1]
+        return found
 
     # Reduction
 

@@ -43,6 +43,7 @@ from chimera_hpc.store.schema import (
     array_plans,
     block_plans,
     sample_times,
+    state_width,
 )
 
 SCHEMA = 1
@@ -143,7 +144,8 @@ def check_root(path: Path, root: Mapping[str, Any], origin: Origin | None = None
         Sweep.from_dict(spec, str(path), origin)
     n_points = attributes["n_points"]
     damaged = [name for name, node in nodes.items() if not _is_sound(name, node, n_points)]
-    for plan in block_plans(sweep, n_points, attributes["block_size"]):
+    n_state = state_width(nodes)
+    for plan in block_plans(sweep, n_points, attributes["block_size"], n_state=n_state):
         missing = plan.name in OPTIONAL and plan.name not in nodes
         if not missing and not _matches(nodes.get(plan.name), plan):
             damaged.append(plan.name)

@@ -111,6 +111,9 @@ def _rows(result: BlockResult, run: int, attempts: NDArray[np.int64]) -> Rows:
     rows["quality"] = canonical(result.quality)
     if result.series is not None:
         rows["u"] = result.series
+    state = getattr(result, "state", None)
+    if state is not None:
+        rows["state"] = canonical(state)
     return rows
 
 

@@ -39,6 +39,8 @@ def test_the_quickstart_job_states_the_defaults():
 def test_the_quickstart_job_names_every_key_that_has_a_default():
     text = QUICKSTART.read_text(encoding="utf-8")
     for table, model in TABLES.items():
+        if table == "continue":  # a job without it has no chains
+            continue
         part = text.partition(f"[{table}]")[2].partition("\n[")[0]
         missing = [
             key for key, field in model.model_fields.items()
@@ -140,7 +142,7 @@ OTHER = {
     "integrator": {
         "method": None, "form": "full", "t_end": 999.0, "t_step": 0.02, "rtol": 1e-4,
         "atol": 1e-7, "delta": 0.1, "centre": "upper", "ball": "euclidean", "max_steps": 9,
-        "time_out": 1.0,
+        "time_out": 1.0, "initial": None, "initial_digest": "0123456789abcdef",
     },
     "features": {
         "preset": None, "start": 900, "n_peaks": 11, "n_overlap": 4, "max_windows": 4,

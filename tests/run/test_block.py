@@ -48,7 +48,8 @@ def sweep(text="", grid='P = [9, 12]\nQ = "P"\nseeds = 3', model="topological_fh
 
 def join(results):
     """One result of several."""
-    parts = {f.name: [getattr(r, f.name) for r in results] for f in fields(results[0])}
+    names = [f.name for f in fields(results[0]) if getattr(results[0], f.name) is not None]
+    parts = {name: [getattr(r, name) for r in results] for name in names}
     return {name: np.concatenate(arrays) for name, arrays in parts.items()}
 
 
