@@ -83,6 +83,10 @@ class ClassNumber:
     @property
     def sentence(self) -> str:
         """The answer in words."""
+        return self.said()
+
+    def said(self, what: str = "runs") -> str:
+        """Return the answer in words, of `what`."""
         k, n = self.answer, self.n_runs - self.n_apart
         each = (
             f"gap statistic {self.by_gap}, silhouette {self.by_silhouette}, "
@@ -90,8 +94,8 @@ class ClassNumber:
         )
         apart = f"; {self.n_apart} lie apart" if self.n_apart else ""
         if k == 1:
-            return f"{n} of {self.n_runs} runs look like one state{apart} ({each})"
-        return f"{n} of {self.n_runs} runs look like {k} classes{apart} ({each})"
+            return f"{n} of {self.n_runs} {what} look like one state{apart} ({each})"
+        return f"{n} of {self.n_runs} {what} look like {k} classes{apart} ({each})"
 
 
 def class_number(points: Floats, seed: int = 0) -> ClassNumber:
@@ -103,7 +107,7 @@ def class_number(points: Floats, seed: int = 0) -> ClassNumber:
     chosen = points[np.lexsort(points.T)]
     if len(chosen) > _MOST_POINTS:
         chosen = chosen[np.sort(rng.choice(len(chosen), _MOST_POINTS, replace=False))]
-    apart = _far_from_others(tree.scale(chosen, tree.limits(chosen)))
+    apart = far_from_others(chosen)
     kept = chosen[~apart]
     scaled = tree.scale(kept, tree.limits(kept))
     most = max(1, min(MOST, len(np.unique(scaled, axis=0)), len(scaled) - 1))
@@ -119,8 +123,9 @@ def class_number(points: Floats, seed: int = 0) -> ClassNumber:
     )
 
 
-def _far_from_others(scaled: Floats) -> NDArray[np.bool_]:
-    """Tell which points have fewer neighbours than a class has members."""
+def far_from_others(points: Floats) -> NDArray[np.bool_]:
+    """Tell which points (n, d) have fewer neighbours than a class has members."""
+    scaled = tree.scale(points, tree.limits(points))
     members = max(3, int(np.ceil(SMALLEST * len(scaled))))
     if len(scaled) <= 2 * members:
         return np.zeros(len(scaled), dtype=np.bool_)
@@ -161,18 +166,24 @@ def _gap(scaled: Floats, labels: list[Integers], rng: np.random.Generator) -> tu
 
 def _silhouettes(scaled: Floats, labels: list[Integers]) -> Floats:
     distances: Floats = cdist(scaled, scaled)
-    return np.array([np.nan, *(_silhouette(distances, label) for label in labels[1:])])
+    return np.array([np.nan, *(float(_silhouette(distances, k).mean()) for k in labels[1:])])
 
 
-def _silhouette(distances: Floats, label: Integers) -> float:
-    """Return the mean silhouette of clusters; 0 for a point that is alone."""
+def silhouettes(scaled: Floats, labels: Integers) -> Floats:
+    """Return the silhouette of each point (n,) in clusters 0, 1, ...; NaN for a single cluster."""
+    if labels.max(initial=0) == 0:
+        return np.full(len(labels), np.nan)
+    return _silhouette(cdist(scaled, scaled), labels)
+
+
+def _silhouette(distances: Floats, label: Integers) -> Floats:
+    """Return the silhouette of each point (n,); 0 for one that is alone."""
     member = (label[:, None] == np.arange(label.max() + 1)).astype(np.float64)
     sums, sizes = distances @ member, member.sum(axis=0)
     alone = sizes[label] == 1.0
     own = sums[member > 0.0] / np.where(alone, 1.0, sizes[label] - 1.0)
     other = np.where(member > 0.0, np.inf, sums / sizes).min(axis=1)
-    score = np.where(alone, 0.0, (other - own) / np.maximum(np.maximum(own, other), 1e-300))
-    return float(score.mean())
+    return np.where(alone, 0.0, (other - own) / np.maximum(np.maximum(own, other), 1e-300))
 
 
 def _stability(scaled: Floats, most: int, rng: np.random.Generator) -> Floats:

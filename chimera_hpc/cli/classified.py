@@ -1,10 +1,9 @@
-"""What ``classify`` says of a recording: lines, JSON, figures."""
+"""What ``classify`` says of recordings: lines, JSON, figures."""
 
 from __future__ import annotations
 
 import warnings
-from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,23 +12,21 @@ import numpy as np
 from chimera_hpc.cli.arguments import errors_in_one_line
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chimera_hpc.job.tables import Features
-    from chimera_hpc.recordings.judge import Judge, Measured
-    from chimera_hpc.recordings.prepare import Prepared
+    from chimera_hpc.recordings.file import Recorded, Treatment
+    from chimera_hpc.recordings.judge import Judge
+    from chimera_hpc.recordings.many import Collection
 
 _MOST_GAPS = 5
 
 
-def lines(
-    args: Namespace,
-    made: Prepared,
-    found: Measured,
-    judge: Judge | None,
-    scale: tuple[float, float],
-) -> Iterator[str]:
+def lines(one: Recorded, how: Treatment, judge: Judge | None) -> Iterator[str]:
     """Yield what was found, for people."""
-    shape = "chain" if args.open else "ring"
-    yield f"{args.file}: {made.u.shape[1]} nodes in a {shape}, {made.t[0]:.9g} to {made.t[-1]:.9g}"
+    made, found, scale = one.made, one.found, one.scale
+    where = f"{made.t[0]:.9g} to {made.t[-1]:.9g}"
+    yield f"{one.path}: {made.u.shape[1]} nodes in a {_shape(how)}, {where}"
     for note in made.notes:
         yield f"  {note}"
     if scale != (1.0, 1.0):
@@ -68,19 +65,18 @@ def lines(
             yield f"  the nearest other class is {verdict.other}, at {verdict.other_distance:.3g}"
 
 
-def report(
-    args: Namespace,
-    made: Prepared,
-    found: Measured,
-    judge: Judge | None,
-    scale: tuple[float, float],
-    files: list[Path],
-) -> dict[str, Any]:
+def _shape(how: Treatment) -> str:
+    return "network" if how.links is not None else "ring" if how.ring else "chain"
+
+
+def report(one: Recorded, how: Treatment, judge: Judge | None, files: list[Path]) -> dict[str, Any]:
     """Return what --json prints."""
+    made, found, scale = one.made, one.found, one.scale
     verdict, features = found.verdict, found.features
     return {
-        "file": str(args.file),
-        "ring": not args.open,
+        "file": str(one.path),
+        "ring": how.ring and how.links is None,
+        "links": None if how.links is None else str(how.links),
         "nodes": list(made.names),
         "samples": len(made.t),
         "start": float(made.t[0]),
@@ -126,19 +122,18 @@ def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def draw(
-    args: Namespace, made: Prepared, found: Measured, settings: Features, judge: Judge | None
-) -> list[Path]:
+def draw(out: Path | None, one: Recorded, settings: Features, judge: Judge | None) -> list[Path]:
     """Draw the recording, its profiles, a spectrum, and its place in the atlas."""
     from chimera_hpc.plot.indicators import fourier_indicators, profiles_of, variations_text
     from chimera_hpc.plot.judged import judged
     from chimera_hpc.plot.spacetime import space_time
     from chimera_hpc.plot.spectrum import spectrum
-    from chimera_hpc.plot.style import plain, save
+    from chimera_hpc.plot.style import plain
     from chimera_hpc.recordings.gaps import called
     from chimera_hpc.reduction.replay import window_spectrum
 
-    words = [args.file.name, (found.name or "").replace("_", " ")]
+    made, found = one.made, one.found
+    words = [one.path.name, (found.name or "").replace("_", " ")]
     title, names = plain("\n".join(filter(None, words))), made.names
     figures = {"space_time": space_time([(made.t, made.u.T)], [title], names=names)}
     if found.features.n_windows:
@@ -154,8 +149,65 @@ def draw(
         figures["atlas"] = judged(
             triplets, judge.atlas.labels, judge.atlas.names, found.triplet, found.verdict.name
         )
-    folder = args.out or Path(f"{args.file.name}-classified")
+    return _save(out or Path(f"{one.path.name}-classified"), figures)
+
+
+def _save(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
+    from chimera_hpc.plot.style import save
+
     # The warnings are of letters that the font lacks.
     with errors_in_one_line(folder), warnings.catch_warnings(action="ignore"):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / name)[0] for name, figure in figures.items()]
+
+
+def table(made: Collection, judge: Judge | None) -> Iterator[str]:
+    """Yield a line for each recording, warnings, and how many classes there are."""
+    head = ("file", "nodes", "samples", "V_theta", "V_a", "V_Omega", "class", "confidence")
+    rows = [head, *(_row(made, i) for i in range(len(made.files)))]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = zip(row, widths, strict=True)
+        yield "  ".join(word.ljust(width) for word, width in cells).rstrip()
+    for one in made.files:
+        for warning in (*one.made.warnings, *one.found.warnings):
+            yield f"warning: {one.path}: {warning}"
+    yield made.sentence if judge is None else f"classes of {judge.path}"
+
+
+def _row(made: Collection, i: int) -> tuple[str, ...]:
+    one, sure = made.files[i], made.confidence[i]
+    variations = [f"{x:.4g}" if np.isfinite(x) else "-" for x in one.found.triplet]
+    samples, nodes = one.made.u.shape
+    confidence = f"{sure:.2f}" if np.isfinite(sure) else "-"
+    name = made.names[i] or "none"
+    return str(one.path), str(nodes), str(samples), *variations, name, confidence
+
+
+def report_all(
+    made: Collection, how: Treatment, judge: Judge | None, files: list[Path]
+) -> dict[str, Any]:
+    """Return what --json prints of several recordings."""
+    every = zip(made.files, made.names, made.confidence.tolist(), strict=True)
+    return {
+        "recordings": [
+            {**report(one, how, judge, []), "class": name, "confidence": _number(sure)}
+            for one, name, sure in every
+        ],
+        "atlas": None if judge is None else str(judge.path),
+        "classes": {name: made.names.count(name) for name in sorted(set(filter(None, made.names)))},
+        "sentence": made.sentence or None,
+        "figures": [str(file) for file in files],
+    }
+
+
+def draw_sheet(out: Path | None, made: Collection) -> list[Path]:
+    """Draw all recordings on one sheet."""
+    from chimera_hpc.plot.recordings import recordings_sheet
+    from chimera_hpc.plot.style import plain
+
+    series = [(one.made.t, one.made.u.T) for one in made.files]
+    titles = [plain(one.path.name) for one in made.files]
+    names = [name or "none" for name in made.names]
+    sheet = recordings_sheet(series, titles, names, made.triplets)
+    return _save(out or Path("recordings-classified"), {"recordings": sheet})

@@ -1,33 +1,36 @@
-"""``classify``: features, variations and class of a recording of one's own."""
+"""``classify``: features, variations and classes of recordings of one's own."""
 
 from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
+from chimera_hpc.base.wording import short
 from chimera_hpc.cli.arguments import add, add_group, flag, folder_name, value
 
 if TYPE_CHECKING:
     from chimera_hpc.job.tables import Features
     from chimera_hpc.recordings.judge import Judge
-    from chimera_hpc.recordings.prepare import Prepared
 
 EPILOG = """examples:
   python -m chimera_hpc.sweep classify recording.csv
   python -m chimera_hpc.sweep classify recording.npz --atlas results/quickstart
   python -m chimera_hpc.sweep classify eeg.npy --step 0.004 --open --order 3,1,0,2 --rescale \\
       --atlas results/quickstart
+  python -m chimera_hpc.sweep classify recordings/*.edf --clusters auto --links network.graphml
 
-FILE is a time series, time by node: .npz, .npy, .csv (.tsv, .txt, .dat; .gz), .mat, .nc, or a Zarr
-store. With an atlas, the reduced sweep of a similar system, it is brought to the sampling step of
-that sweep,
-measured by its settings, and gets the class of the nearest of its runs, with the distance to it.
+FILE is a time series, time by node: .npz, .npy, .csv (.tsv, .txt, .dat; .gz), .mat, .h5, .edf,
+.bdf, .nc, or a Zarr store. Several files, a folder of files or a pattern in quotes give one table
+and one sheet of figures; without an atlas they are clustered among themselves.
+With an atlas, the reduced sweep of a similar system, a recording is brought to the sampling step of
+that sweep, measured by its settings, and gets the class of the nearest of its runs, with the
+distance to it.
 Variations of amplitude and frequency have units: --factors brings a recording in other units to
 those of the atlas, --rescale guesses the factors from the medians. What is missing is listed; files
 of pickled objects are refused.
@@ -42,7 +45,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     preset = "default or paper-printed: sets several settings (default: those of the atlas)"
     setting = "a setting of the table [features], e.g. n_peaks=5; may be repeated"
     along = "what to take along another dimension (NetCDF, Zarr); may be repeated"
-    parser.add_argument("file", **value("FILE", Path, "the recording"))
+    what = "the recording; several, folders and patterns"
+    parser.add_argument("files", nargs="+", **value("FILE", Path, what))
     add_group(
         parser,
         "what is what in the file",
@@ -56,6 +60,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser,
         "nodes and times",
         open=flag("a chain: the last node ends it"),
+        links=value("FILE", Path, "network: variations are taken over its links"),
         order=value("LIST", str, "nodes by name or number from 0, with commas; or a file"),
         drop=value("LIST", str, "columns to leave out, by name or number; or a file of them"),
         start=value("T", float, "first time to take"),
@@ -71,7 +76,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser,
         "--json",
         atlas=value("STORE", Path, "a reduced sweep's folder"),
-        out=value("DIR", folder_name, "figures (default: FILE-classified)"),
+        clusters=value("N", _number_of_clusters, "cluster several files: N clusters, or auto"),
+        out=value("DIR", folder_name, "figures (default: FILE-classified, recordings-classified)"),
         no_figures=flag("no figures"),
     )
 
@@ -81,6 +87,10 @@ def execute(args: Namespace) -> int:
         raise BadInput(f"--bridge {args.bridge}: allowed is 0 or more")
     if args.rescale and args.atlas is None:
         raise BadInput("--rescale: to the units of what? --atlas STORE says it")
+    if args.links is not None and args.open:
+        raise BadInput("--links and --open: one of them")
+    if args.clusters is not None and args.atlas is not None:
+        raise BadInput("--clusters and --atlas: one of them")
     # What a model prints goes to stderr: stdout holds the answer alone.
     with redirect_stdout(sys.stderr):
         answer = _answer(args)
@@ -89,32 +99,49 @@ def execute(args: Namespace) -> int:
     return Exit.COMPLETE
 
 
-def _answer(args: Namespace) -> list[str]:
-    from chimera_hpc.cli.classified import draw, lines, report
-    from chimera_hpc.recordings.judge import Judge, measure
-    from chimera_hpc.recordings.prepare import in_order, with_times
-    from chimera_hpc.recordings.read import read_recording
+def _number_of_clusters(text: str) -> Any:
+    if text != "auto" and not (text.isdecimal() and 0 < int(text) < 1000):
+        raise ArgumentTypeError(f"{short(text)}: a number from 1 on, or auto, is needed")
+    return text if text == "auto" else int(text)
 
+
+def _answer(args: Namespace) -> list[str]:
+    from chimera_hpc.cli.classified import draw, draw_sheet, lines, report, report_all, table
+    from chimera_hpc.recordings.file import Treatment, measure_file
+    from chimera_hpc.recordings.judge import Judge
+    from chimera_hpc.recordings.many import measure_files, recording_files
+
+    paths = recording_files(args.files)
     judge = None if args.atlas is None else Judge.load(args.atlas, args.preset)
     settings = _settings(args.overrides, judge, args.preset)
-    read = read_recording(args.file, _choice(args))
-    scale = _factors(args)
-    absolute = any(name in text for text in args.overrides for name in ("still", "steady"))
-    try:
-        recording = in_order(with_times(read, args.step), args.order)
-        if args.rescale and judge is not None:
-            from chimera_hpc.recordings.judge import features_of, scale_to
-
-            scale = scale_to(features_of(_prepare(recording, None, args, scale), settings), judge)
-        made = _prepare(recording, None if judge is None else judge.step, args, scale)
-        found = measure(made, settings, not args.open, judge, absolute)
-    except BadInput as error:
-        raise BadInput(f"{args.file}: {error}") from None
-    files = [] if args.no_figures else draw(args, made, found, settings, judge)
+    how = Treatment(
+        choice=_choice(args),
+        step=args.step,
+        order=args.order,
+        span=(args.start, args.end),
+        bridge=args.bridge,
+        scale=_factors(args),
+        rescale=args.rescale,
+        lowpass=args.lowpass,
+        ring=not args.open,
+        links=args.links,
+        absolute=any(name in text for text in args.overrides for name in ("still", "steady")),
+    )
+    if paths == args.files and len(paths) == 1 and args.clusters is None:
+        one = measure_file(paths[0], how, settings, judge)
+        files = [] if args.no_figures else draw(args.out, one, settings, judge)
+        if args.json:
+            return [json.dumps(report(one, how, judge, files), allow_nan=False)]
+        return [*lines(one, how, judge), *_written(files)]
+    made = measure_files(paths, how, settings, judge, args.clusters or "auto")
+    files = [] if args.no_figures else draw_sheet(args.out, made)
     if args.json:
-        return [json.dumps(report(args, made, found, judge, scale, files), allow_nan=False)]
-    written = [f"written: {file}" for file in files]
-    return [*lines(args, made, found, judge, scale), *written]
+        return [json.dumps(report_all(made, how, judge, files), allow_nan=False)]
+    return [*table(made, judge), *_written(files)]
+
+
+def _written(files: list[Path]) -> list[str]:
+    return [f"written: {file}" for file in files]
 
 
 def _factors(args: Namespace) -> tuple[float, float]:
@@ -172,14 +199,3 @@ def _settings(overrides: list[str], judge: Judge | None, preset: str | None) -> 
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise BadInput(f"--set {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
-
-
-def _prepare(
-    recording: Any, step: float | None, args: Namespace, scale: tuple[float, float]
-) -> Prepared:
-    from chimera_hpc.recordings.prepare import prepare
-
-    span = (args.start, args.end)
-    return prepare(
-        recording, step, span=span, bridge=args.bridge, scale=scale, lowpass=args.lowpass
-    )

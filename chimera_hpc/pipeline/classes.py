@@ -41,6 +41,8 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
     labels_ : array of int, shape (runs,)
         Position of each run's class in `names_`; -1 for none.
     names_ : tuple of str
+    scaler_ : array, shape (2, columns)
+        Smallest and largest value of each column, which are scaled to 0 and 1.
     atlas_ : Atlas
         The runs in scaled space, by which `predict` judges.
     """
@@ -74,6 +76,7 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
         )
         cut = made.cuts[self.n]
         self.labels_, self.names_, self.atlas_ = cut.labels, cut.names, Atlas.of(made, cut)
+        self.scaler_ = made.scaler
         return self
 
     def predict(self, X: Any) -> NDArray[np.int64]:

@@ -139,23 +139,29 @@ class Measured:
 
 
 def measure(
-    made: Prepared, settings: Features, ring: bool, judge: Judge | None, absolute: bool = False
+    made: Prepared,
+    settings: Features,
+    ring: bool,
+    judge: Judge | None,
+    absolute: bool = False,
+    pairs: NDArray[np.int64] | None = None,
 ) -> Measured:
     """Measure signals on an even grid, and judge them by an atlas if there is one.
 
     settings: windows, clock and the other settings; ``start`` and ``groups`` are not used.
     ring: whether the last node is a neighbour of the first.
     absolute: whether the user sets ``steady_threshold``, in the unit of the signal.
+    pairs (M, 2): pairs of nodes over which variations are taken, in place of ring or chain.
 
     Raises BadInput: fewer than three nodes (two for a chain), or as `fourier_features`.
     """
     n_nodes, least = made.u.shape[1], 3 if ring else 2
-    if n_nodes < least:
+    if n_nodes < least and pairs is None:
         what = "1 node" if n_nodes == 1 else f"{n_nodes} nodes"
         raise BadInput(f"{what}: a {'ring' if ring else 'chain'} has at least {least}")
     limit, warnings = _steady_below(made.u, settings.steady_threshold, judge, absolute)
     features = features_of(made, settings, limit)
-    triplet = total_variations(features, ring=ring)
+    triplet = total_variations(features, ring=ring, pairs=pairs)
     fastest = float(np.nanmax(np.append(features.frequency, 0.0)))
     samples = 1.0 / (fastest * made.recorded_step) if fastest > 0.0 else float("nan")
     for what, step in (("the recording", made.recorded_step), ("the grid", made.step)):

@@ -30,8 +30,8 @@ _ZARR = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
 def read_recording(path: Path, choice: Choice) -> Recording:
     """Read a time series, time by node.
 
-    path: .npz, .npy, .csv (.tsv, .txt, .dat; also .gz), .mat, .nc (NetCDF), or the folder of a Zarr
-        store.
+    path: .npz, .npy, .csv (.tsv, .txt, .dat; also .gz), .mat, .h5 (.hdf5), .edf, .bdf, .nc
+        (NetCDF), or the folder of a Zarr store.
 
     Raises BadInput: no such file, another format, a file with pickled objects, or one that leaves
     open what the signals or the times are.
@@ -52,16 +52,29 @@ def read_recording(path: Path, choice: Choice) -> Recording:
 
 def _reader(path: Path) -> Reader:
     if path.is_dir():
-        if not any((path / name).is_file() for name in _ZARR):
+        if not is_zarr(path):
             raise BadInput("a folder that is no Zarr store")
         return _read_zarr
     if not path.exists():
         raise BadInput("no such file")
-    name = path.name.lower()
-    reader = READERS.get(Path(name.removesuffix(".gz")).suffix)
-    if reader is None or (name.endswith(".gz") and reader is not read_table):
+    if not known_ending(path):
         raise BadInput(f"allowed are {', '.join(READERS)}, tables with .gz too, and Zarr stores")
-    return reader
+    return READERS[_ending(path)]
+
+
+def is_zarr(path: Path) -> bool:
+    """Tell whether a folder is a Zarr store, or a sweep's folder with one."""
+    return any((path / name).is_file() for name in (*_ZARR, "store.zarr/zarr.json"))
+
+
+def known_ending(path: Path) -> bool:
+    """Tell whether a recording of this name can be read."""
+    reader = READERS.get(_ending(path))
+    return reader is not None and (reader is read_table or not path.name.lower().endswith(".gz"))
+
+
+def _ending(path: Path) -> str:
+    return Path(path.name.lower().removesuffix(".gz")).suffix
 
 
 def _refuse_options(reader: Reader, choice: Choice) -> None:
@@ -69,7 +82,7 @@ def _refuse_options(reader: Reader, choice: Choice) -> None:
     labelled = reader in (_read_netcdf, _read_zarr)
     if choice.select and not labelled:
         raise BadInput(f"--select {choice.select[0][0]}: a file of this kind names no dimensions")
-    if choice.variable and reader in (_read_npy, read_table):
+    if choice.variable and reader in (_read_npy, read_table, _read_edf):
         raise BadInput(f"--variable {choice.variable}: a file of this kind has no named arrays")
 
 
@@ -117,17 +130,55 @@ def _flat(values: dict[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def _read_mat73(path: Path) -> dict[str, Any]:
+    # HDF5 has the axes of MATLAB in reverse.
+    return {name: array.T for name, array in _hdf5_arrays(path, "a MATLAB 7.3 file").items()}
+
+
+def _hdf5_arrays(path: Path, kind: str) -> dict[str, Any]:
+    """Return the numbers in an HDF5 file, those of groups as ``group.name``."""
     try:
         import h5py  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
-        raise BadInput("is a MATLAB 7.3 file, which needs the package h5py: "
-                       "python -m pip install h5py") from None  # fmt: skip
-    with h5py.File(path) as file:  # HDF5 has the axes of MATLAB in reverse
+        raise _needs("h5py", kind) from None
+    with h5py.File(path) as file:
         names: list[str] = []
         file.visit(names.append)
         arrays = {name: file[name] for name in names if not name.startswith("#")}
-        return {k.replace("/", "."): np.asarray(a).T for k, a in arrays.items()
-                if isinstance(a, h5py.Dataset)}  # fmt: skip
+        return {k.replace("/", "."): np.asarray(a) for k, a in arrays.items()
+                if isinstance(a, h5py.Dataset) and a.dtype.kind in "iufc"}  # fmt: skip
+
+
+def _needs(package: str, kind: str) -> BadInput:
+    return BadInput(f"is {kind}, which needs the package {package}: "
+                    f"python -m pip install {package}")  # fmt: skip
+
+
+def _read_hdf5(path: Path, choice: Choice) -> Recording:
+    return _arrays(_hdf5_arrays(path, "an HDF5 file"), choice)
+
+
+def _read_edf(path: Path, choice: Choice) -> Recording:
+    """Read the signals of an EDF or BDF file that have the most samples per second."""
+    try:
+        import edfio  # type: ignore[import-not-found, unused-ignore]
+    except ImportError:
+        raise _needs("edfio", "an EDF or BDF file") from None
+    try:
+        read = edfio.read_bdf if path.suffix.lower() == ".bdf" else edfio.read_edf
+        signals = read(path).signals
+    except (ValueError, KeyError, IndexError, NotImplementedError) as error:
+        raise BadInput(f"can't be read as an EDF or BDF file: {_line(error)}") from None
+    if not signals:
+        raise BadInput("has no signal")
+    rate = max(signal.sampling_frequency for signal in signals)
+    kept = [signal for signal in signals if signal.sampling_frequency == rate]
+    notes = [f"{rate:g} samples per second, by the file"]
+    if len(kept) < len(signals):
+        notes.append(f"{len(signals) - len(kept)} signals with fewer samples per second left out")
+    u = as_signals("signals", np.stack([signal.data for signal in kept], axis=1))
+    t = np.arange(len(u), dtype=np.float64) / rate
+    names = tuple(signal.label for signal in kept)
+    return Recording(None if choice.no_times else t, u, names, tuple(notes))
 
 
 def _arrays(shapes: dict[str, Any], choice: Choice) -> Recording:
@@ -289,5 +340,9 @@ READERS: dict[str, Reader] = {
     ".txt": read_table,
     ".dat": read_table,
     ".mat": _read_mat,
+    ".h5": _read_hdf5,
+    ".hdf5": _read_hdf5,
+    ".edf": _read_edf,
+    ".bdf": _read_edf,
     ".nc": _read_netcdf,
 }
