@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from chimera_hpc.models.topological_fhn import TopologicalFHN
     from chimera_hpc.network.network import Network
     from chimera_hpc.network.topology import Topology
+    from chimera_hpc.recordings.many import classify_recordings
     from chimera_hpc.run.simulate import simulate
     from chimera_hpc.store.labelled import open_sweep as open
 
@@ -41,6 +42,7 @@ __all__ = [
     "TopologicalFHN",
     "Topology",
     "__version__",
+    "classify_recordings",
     "fourier_features",
     "natural_frequencies",
     "open",
@@ -62,6 +64,7 @@ _EXPORTS = {
     "OwnModel": ("chimera_hpc.models.custom", "OwnModel"),
     "Parameter": ("chimera_hpc.models.parameters", "Parameter"),
     "Topology": ("chimera_hpc.network.topology", "Topology"),
+    "classify_recordings": ("chimera_hpc.recordings.many", "classify_recordings"),
     "fourier_features": ("chimera_hpc.measures.fourier", "fourier_features"),
     "open": ("chimera_hpc.store.labelled", "open_sweep"),
     "simulate": ("chimera_hpc.run.simulate", "simulate"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -32,7 +33,8 @@ def recordings_sheet(
     shown = min(len(series), MOST)
     rows = -(-shown // _COLUMNS)
     figure = style.new_figure(style.PAGE + 1.5, 2.9 + 1.35 * rows)
-    top, bottom = figure.subfigures(2, 1, height_ratios=(2.9, 1.35 * rows))
+    parts: Any = figure.subfigures(2, 1, height_ratios=(2.9, 1.35 * rows))
+    top, bottom = parts
     kinds = style.in_order(names)
     labels = [kinds.index(name) for name in names]
     for axes, plane in zip(top.subplots(1, 3), PLANES, strict=True):

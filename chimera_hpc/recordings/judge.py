@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -186,7 +187,8 @@ def features_of(
 ) -> NodeFeatures:
     """Return the Fourier features of a prepared recording; steady is relative unless told."""
     options = settings.options()
-    limit = _FLAT * _size(made.u) if steady_threshold is None else steady_threshold
+    own = max(_FLAT * _size(made.u), sys.float_info.min)
+    limit = own if steady_threshold is None else steady_threshold
     return measure_signals(made.t, made.u, **{**options, "steady_threshold": limit})
 
 
@@ -204,7 +206,7 @@ def _steady_below(
     the unit of the signal: the user's is taken, the sweep's only for what is small in itself too.
     """
     deviation, size = float(u.std(axis=0).mean()), _size(u)
-    own = _FLAT * size
+    own = max(_FLAT * size, sys.float_info.min)
     if own <= deviation < min(_FAINT * size, threshold if absolute else np.inf):
         return own, [f"signals vary by {deviation:.3g} (standard deviation) round a level of "
                      f"{size:.6g}: rounding, or the output of a solver at rest?"]  # fmt: skip

@@ -137,7 +137,7 @@ def _read_mat73(path: Path) -> dict[str, Any]:
 def _hdf5_arrays(path: Path, kind: str) -> dict[str, Any]:
     """Return the numbers in an HDF5 file, those of groups as ``group.name``."""
     try:
-        import h5py  # type: ignore[import-not-found, unused-ignore]
+        import h5py
     except ImportError:
         raise _needs("h5py", kind) from None
     with h5py.File(path) as file:
@@ -160,7 +160,7 @@ def _read_hdf5(path: Path, choice: Choice) -> Recording:
 def _read_edf(path: Path, choice: Choice) -> Recording:
     """Read the signals of an EDF or BDF file that have the most samples per second."""
     try:
-        import edfio  # type: ignore[import-not-found, unused-ignore]
+        import edfio
     except ImportError:
         raise _needs("edfio", "an EDF or BDF file") from None
     try:

@@ -1,0 +1,211 @@
+"""Many recordings: found, clustered among themselves, judged by an atlas, in all formats."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from chimera_hpc import classify_recordings
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.classify.agreement import adjusted_rand
+from chimera_hpc.recordings.many import recording_files
+from chimera_hpc.sweep import main
+
+Array = NDArray[np.float64]
+T = 0.02 * np.arange(1000)
+N = 16
+
+
+def kind_of_ring(kind: int, rng: np.random.Generator) -> Array:
+    """A wave, a wave next to drifting nodes of all sizes, or random phases; with noise."""
+    half = N // 2
+    phase = 2 * np.pi * np.arange(N) / N + rng.normal(scale=0.05, size=N)
+    speed, size = np.ones(N), np.ones(N)
+    if kind == 1:
+        phase[half:] = rng.uniform(-np.pi, np.pi, half)
+        speed[half:] += rng.uniform(0.05, 0.4, half)
+        size[half:] = rng.uniform(0.5, 1.5, half)
+    elif kind == 2:
+        phase = rng.uniform(-np.pi, np.pi, N)
+    noise = 0.02 * rng.normal(size=(len(T), N))
+    return size * np.cos(2 * np.pi * speed * T[:, None] + phase) + noise
+
+
+def write(folder: Path, kinds: list[int], seed: int = 7) -> list[Path]:
+    rng = np.random.default_rng(seed)
+    folder.mkdir(exist_ok=True)
+    files = [folder / f"{i:03d}-{kind}.npz" for i, kind in enumerate(kinds)]
+    for file, kind in zip(files, kinds, strict=True):
+        np.savez(file, t=T, u=kind_of_ring(kind, rng))
+    return files
+
+
+def test_forty_recordings_of_three_kinds_are_three_classes(tmp_path: Path) -> None:
+    files = write(tmp_path / "rings", [i % 3 for i in range(40)])
+    found = classify_recordings(tmp_path / "rings")
+    kinds = [file.stem[-1] for file in files]
+    assert adjusted_rand(found["class"].values.tolist(), kinds) == 1.0
+    assert found.sentence.startswith("40 of 40 recordings look like 3 classes (gap ")
+    assert set(found["class"].values) == {"A", "B", "C"}
+    assert found.recording.values.tolist() == list(map(str, files))
+    assert found.value.dims == ("recording", "quantity")
+    assert found.value.sel(quantity="frequency").values[::3] == pytest.approx(1.0, abs=0.03)
+    assert float(found.confidence.min()) >= 0.0
+    assert float(found.confidence.median()) > 0.6
+
+
+def test_recordings_of_one_kind_are_one_class(tmp_path: Path) -> None:
+    found = classify_recordings(write(tmp_path, [2] * 14))
+    assert found.sentence.startswith("14 of 14 recordings look like one state (gap ")
+    assert set(found["class"].values) == {"A"}
+    assert np.isnan(found.confidence.values).all()
+
+
+def test_few_recordings_are_one_class_unless_told(tmp_path: Path) -> None:
+    files = write(tmp_path, [0, 0, 0, 1])
+    np.savez(tmp_path / "still.npz", t=T, u=np.zeros((len(T), N)))
+    found = classify_recordings(tmp_path, clusters=2)
+    assert found["class"].values.tolist() == ["A", "A", "A", "B", "steady"]
+    assert found.status.values.tolist() == ["done"] * 4 + ["steady"]
+    few = classify_recordings(files)
+    assert few.sentence == (
+        "4 oscillating recordings are too few to count classes: 10 are needed, or --clusters N"
+    )
+    with pytest.raises(BadInput, match="--clusters 5: 4 of 5 recordings oscillate"):
+        classify_recordings(tmp_path, clusters=5)
+
+
+def test_variations_over_the_links_of_a_network(tmp_path: Path) -> None:
+    (file,) = write(tmp_path, [2])
+    ring, chain = tmp_path / "ring.csv", tmp_path / "two.csv"
+    ring.write_text("".join(f"{i},{(i + 1) % N}\n" for i in range(N)))
+    chain.write_text("0,1\n1,2\n")
+    over_links = classify_recordings(file, links=ring).value.values
+    np.testing.assert_allclose(over_links, classify_recordings(file).value.values, rtol=1e-12)
+    with pytest.raises(BadInput, match=r"two.csv: a network of 3 nodes; the recording has 16"):
+        classify_recordings(file, links=chain)
+
+
+def test_files_are_found_in_folders_and_by_patterns(tmp_path: Path) -> None:
+    files = write(tmp_path / "a", [0, 1])
+    (tmp_path / "a" / ".hidden.npz").touch()
+    (tmp_path / "a" / "notes.md").touch()
+    assert recording_files([tmp_path / "a"]) == files
+    assert recording_files([f"{tmp_path}/a/*-1.npz", files[1], files[0]]) == [files[1], files[0]]
+    for word, said in ((f"{tmp_path}/*.csv", "no file matches"), (tmp_path, "no recording in")):
+        with pytest.raises(BadInput, match=said):
+            recording_files([word])
+
+
+def test_command_prints_one_table_and_draws_one_sheet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / "in", [0, 0, 0, 1])
+    words = ["classify", str(tmp_path / "in"), "--clusters", "2", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    head, *rows, sentence, written = capsys.readouterr().out.splitlines()
+    assert head.split() == [
+        "file",
+        "nodes",
+        "samples",
+        "V_theta",
+        "V_a",
+        "V_Omega",
+        "class",
+        "confidence",
+    ]
+    names = [row.split()[-2] for row in rows if not row.startswith("warning: ")]
+    assert names == ["A", "A", "A", "B"]
+    assert sentence == "4 of 4 recordings oscillate"
+    assert written == f"written: {tmp_path / 'out' / 'recordings.png'}"
+    assert main([*words, "--json", "--no-figures"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["class"] for one in found["recordings"]] == ["A", "A", "A", "B"]
+    assert found["classes"] == {"A": 3, "B": 1}
+    assert found["figures"] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--clusters", "0"), "from 1 on, or auto, is needed"),
+        (("--clusters", "2", "--atlas", "x"), "--clusters and --atlas: one of them"),
+        (("--links", "x", "--open"), "--links and --open: one of them"),
+        (("--links", "x.csv"), "x.csv: No such file or directory"),
+    ],
+)
+def test_contradictions_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+) -> None:
+    files = write(tmp_path, [0, 0])
+    try:
+        code = main(["classify", *map(str, files), *words, "--no-figures"])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert said in err.splitlines()[-1]
+
+
+def as_edf(edfio: object, file: Path, u: Array) -> None:
+    signals = [
+        edfio.EdfSignal(column, sampling_frequency=50, label=f"ch{i}")  # type: ignore[attr-defined]
+        for i, column in enumerate(u.T)
+    ]
+    edfio.Edf(signals).write(file)  # type: ignore[attr-defined]
+
+
+def as_bdf(edfio: object, file: Path, u: Array) -> None:
+    signals = [
+        edfio.BdfSignal(column, sampling_frequency=50, label=f"ch{i}")  # type: ignore[attr-defined]
+        for i, column in enumerate(u.T)
+    ]
+    edfio.Bdf(signals).write(file)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("ending", "make"), [(".edf", as_edf), (".bdf", as_bdf)])
+def test_edf_and_bdf(tmp_path: Path, ending: str, make: Callable[..., None]) -> None:
+    edfio = pytest.importorskip("edfio")
+    u = kind_of_ring(1, np.random.default_rng(0))
+    np.savez(tmp_path / "a.npz", t=T, u=u)
+    make(edfio, tmp_path / f"b{ending}", u)
+    plain, read = classify_recordings([tmp_path / "a.npz", tmp_path / f"b{ending}"]).value.values
+    np.testing.assert_allclose(read, plain, rtol=2e-3, atol=1e-3)
+    (tmp_path / f"c{ending}").write_bytes(b"0       no header")
+    with pytest.raises(BadInput, match=f"c{ending}: can't be read"):
+        classify_recordings(tmp_path / f"c{ending}")
+
+
+@pytest.mark.parametrize("ending", [".h5", ".mat"])
+def test_hdf5_and_matlab_7_3(tmp_path: Path, ending: str) -> None:
+    h5py = pytest.importorskip("h5py")
+    u = kind_of_ring(1, np.random.default_rng(0))
+    np.savez(tmp_path / "a.npz", t=T, u=u)
+    with h5py.File(tmp_path / f"b{ending}", "w", userblock_size=512) as file:
+        file["rec/u"] = u.T if ending == ".mat" else u
+        file["rec/time"] = T
+        file["note"] = "no numbers"
+    if ending == ".mat":
+        head = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+        with (tmp_path / "b.mat").open("r+b") as raw:
+            raw.write(head)
+    plain, read = classify_recordings([tmp_path / "a.npz", tmp_path / f"b{ending}"]).value.values
+    np.testing.assert_array_equal(read, plain)
+
+
+@pytest.mark.parametrize(
+    ("ending", "package"), [(".h5", "h5py"), (".edf", "edfio"), (".bdf", "edfio")]
+)
+def test_missing_packages_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, package: str
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, package, None)
+    (tmp_path / f"a{ending}").touch()
+    with pytest.raises(BadInput, match=f"needs the package {package}: python -m pip install"):
+        classify_recordings(tmp_path / f"a{ending}")
