@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from chimera_hpc.recordings.file import Treatment, measure_file
     from chimera_hpc.recordings.judge import Judge, measure
     from chimera_hpc.recordings.many import classify_recordings
-    from chimera_hpc.recordings.prepare import prepare, with_times
+    from chimera_hpc.recordings.preparing import prepare, with_times
     from chimera_hpc.recordings.read import read_recording
     from chimera_hpc.recordings.recording import Choice, Recording
 
@@ -20,9 +20,9 @@ _HOMES = {
     "classify_recordings": "many",
     "measure": "judge",
     "measure_file": "file",
-    "prepare": "prepare",
+    "prepare": "preparing",
     "read_recording": "read",
-    "with_times": "prepare",
+    "with_times": "preparing",
 }
 
 __all__ = [

@@ -13,7 +13,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job.tables import Features
 from chimera_hpc.network.network import Network
 from chimera_hpc.recordings.judge import Judge, Measured, features_of, measure, scale_to
-from chimera_hpc.recordings.prepare import Prepared, in_order, prepare, with_times
+from chimera_hpc.recordings.preparing import Prepared, in_order, prepare, with_times
 from chimera_hpc.recordings.read import read_recording
 from chimera_hpc.recordings.recording import Choice, Recording
 

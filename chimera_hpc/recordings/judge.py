@@ -23,7 +23,7 @@ from chimera_hpc.measures.variation import total_variations
 from chimera_hpc.measures.windows import maxima
 from chimera_hpc.recordings.columns import STILL, how_to_drop, some_of
 from chimera_hpc.recordings.gaps import called
-from chimera_hpc.recordings.prepare import Prepared
+from chimera_hpc.recordings.preparing import Prepared
 from chimera_hpc.reduction.atlases import load_atlas
 from chimera_hpc.reduction.conventions import OWN, conventions
 from chimera_hpc.store.store import Store

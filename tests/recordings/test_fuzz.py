@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job.tables import Features
 from chimera_hpc.recordings.judge import measure
-from chimera_hpc.recordings.prepare import prepare, with_times
+from chimera_hpc.recordings.preparing import prepare, with_times
 from chimera_hpc.recordings.read import read_recording
 from chimera_hpc.recordings.recording import Choice
 

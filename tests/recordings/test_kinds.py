@@ -11,7 +11,7 @@ import pytest
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job.tables import Features
 from chimera_hpc.recordings.judge import Measured, measure
-from chimera_hpc.recordings.prepare import in_order, prepare, with_times
+from chimera_hpc.recordings.preparing import in_order, prepare, with_times
 from chimera_hpc.recordings.read import read_recording
 from chimera_hpc.recordings.recording import Choice, Recording
 

@@ -7,7 +7,7 @@ import pytest
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch
-from chimera_hpc.recordings.prepare import prepare, with_times
+from chimera_hpc.recordings.preparing import prepare, with_times
 from chimera_hpc.recordings.recording import Recording
 
 NAN = np.nan
