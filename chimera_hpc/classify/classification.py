@@ -24,6 +24,9 @@ from chimera_hpc.classify.classifiers import (
 )
 from chimera_hpc.classify.tree import Floats, Integers, Split
 
+TRIPLET = ("V_theta", "V_a", "V_Omega")
+"""Names of the total variations, in the order of the columns of triplets."""
+
 LARGEST_TREE: dict[tree.Linkage, int] = {"ward": 100_000, "average": 10_000, "complete": 10_000}
 """Most points in one tree. With Ward's linkage, triplets of a sweep take 20 s, and
 evenly spread ones 70 s; the other linkages take 4 s and 0.8 GB."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add, load_job, sweep_folder
+from chimera_hpc.cli.arguments import STORE, add, load_job, sweep_folder
+from chimera_hpc.cli.deciding import plan_line
 from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, memory_lines, refuse_absurd
 from chimera_hpc.cli.run import check_drawing
 from chimera_hpc.job import Sweep
@@ -37,6 +38,8 @@ def execute(args: Namespace) -> int:
     if (chains := sweep.continue_) is not None:
         way = "both ways" if chains.direction == "both" else chains.direction
         print(f"chains      {need.blocks} of {need.block} points along {chains.along}, {way}")
+    if sweep.decide is not None:
+        print(plan_line(sweep, folder / STORE))
     print(f"blocks      {need.blocks} of up to {need.block} points")
     print(f"files       {need.files}")
     print(f"store       {in_bytes(need.bytes)} at most")

@@ -17,6 +17,7 @@ from chimera_hpc.base.files import time_at
 from chimera_hpc.base.status import Status
 from chimera_hpc.cli.arguments import add, flag, store_path
 from chimera_hpc.cli.cell_map import Cells, draw
+from chimera_hpc.cli.deciding import decide_state, state_line
 from chimera_hpc.cli.estimate import in_time
 from chimera_hpc.store.claims import live_claims
 from chimera_hpc.store.ledger import (
@@ -96,6 +97,7 @@ def state_of(path: Path, metadata: Mapping[str, Any], scan: LedgerScan) -> dict[
         "core_seconds_left": None if mean is None else mean * counts[Status.NEVER],
         "points_a_second": rate,
         "seconds_left": counts[Status.NEVER] / rate if rate else None,
+        **({} if (decide := decide_state(path, metadata)) is None else {"decide": decide}),
     }
 
 
@@ -160,6 +162,8 @@ def lines_of(state: Mapping[str, Any]) -> list[str]:
         f"  blocks: {state['blocks_written']} of {state['blocks']} written, "
         f"{state['blocks_running']} running, {state['blocks_damaged']} damaged"
     )
+    if "decide" in state:
+        lines.append(state_line(state["decide"]))
     if state["points_a_second"]:
         rate, left = state["points_a_second"], state["seconds_left"]
         lines.append(f"  {rate:.3g} points per second now, about {in_time(left)} to go")

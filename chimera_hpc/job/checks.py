@@ -10,6 +10,7 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.added import SEEDS, cells_of, check_columns
 from chimera_hpc.job.axes import Axis, Values, normal_form, parse_axis, references, resolve
 from chimera_hpc.job.networks import NETWORK_SEED
 from chimera_hpc.job.parameters import DELTA, SEED, SEED_COUNT
@@ -159,6 +160,23 @@ def check_points(model: ModelParameters, axes: Mapping[str, Axis], fixed: Fixed)
     refuse_huge(n_rows * prod(len(axis.values) for axis in free if isinstance(axis, Values)))
 
 
+def check_added(
+    model: ModelParameters, axes: Mapping[str, Axis], fixed: Fixed, added: Mapping[str, Any]
+) -> None:
+    """Raise BadInput for an incomplete table [added], or a cell beyond the model's limits."""
+    names = [name for name in axes if name != "seed"]
+    check_columns(added, names)
+    for name in names:
+        parameter = axis_parameter(model, name)
+        for value in set(added[name]):
+            _at(f"added.{name}", parameter.check, value)
+    columns: dict[str, Column] = cells_of(added, names)
+    whole = {name: np.full(len(added[SEEDS]), value) for name, value in fixed.items()}
+    for limit in model.limits:
+        if limit.name in columns or any(name in columns for name in limit.needs):
+            _check_limit(limit, {**whole, **columns}, int(fixed["n_nodes"]), fixed, "added")
+
+
 def check_tables(
     integrator: Integrator, features: Features, model: ModelParameters, axes: Mapping[str, Axis]
 ) -> None:
@@ -188,12 +206,18 @@ def check_nodes(features: Features, n_nodes: int) -> None:
         raise BadInput(f"features.groups: {features.groups} is more than n_nodes = {n_nodes}")
 
 
-def _check_limit(limit: Limit, columns: Mapping[str, Column], n_nodes: int, fixed: Fixed) -> None:
+def _check_limit(
+    limit: Limit,
+    columns: Mapping[str, Column],
+    n_nodes: int,
+    fixed: Fixed,
+    home: str = "grid",
+) -> None:
     highest = np.broadcast_to(limit.highest(columns, n_nodes), columns[limit.name].shape)
     beyond = columns[limit.name] > highest
     if beyond.any():
         row = int(np.argmax(beyond))
-        table = "fixed" if limit.name in fixed else "grid"
+        table = "fixed" if limit.name in fixed else home
         given = "".join(f", {name} = {columns[name][row]}" for name in limit.needs)
         raise BadInput(
             f"{table}.{limit.name}: {columns[limit.name][row]} is too large, at most {highest[row]}"

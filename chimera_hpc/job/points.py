@@ -121,6 +121,25 @@ def _holds(name: str, column: Column, value: float) -> NDArray[np.bool_]:
     return near
 
 
+def appended(points: Points, more: Points) -> Points:
+    """Return the points, then those of `more` that are not among them; the axes of `more`."""
+    new = ~np.isin(point_keys(more, points), point_keys(points))
+    columns = {
+        name: np.concatenate([column, more.columns[name][new]])
+        for name, column in points.columns.items()
+    }
+    return Points(columns, more.axes)
+
+
+def point_keys(points: Points, like: Points | None = None) -> NDArray[np.void]:
+    """Return each point as its bytes, in the order of the columns of `like`."""
+    # Adding 0 turns -0.0 into 0.0, which is the same parameter.
+    rows = [(points.columns[name] + 0).view(np.int64) for name in (like or points).columns]
+    table = np.ascontiguousarray(np.stack(rows, axis=1))
+    keys: NDArray[np.void] = table.view(np.dtype((np.void, 8 * len(rows))))[:, 0]
+    return keys
+
+
 def dependency_order(axes: Mapping[str, Axis]) -> list[str]:
     """Return the names sorted so that each comes after those it depends on.
 

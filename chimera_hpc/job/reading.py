@@ -55,10 +55,10 @@ def apply_overrides(
     """Return the data with each KEY=VALUE applied.
 
     KEY is `table.key`, or a bare key: name, title, model; `seeds`; a parameter of the model; or a
-    key of exactly one other table. A parameter is set in [grid] if it is already an axis or if the
-    value describes one (a list, a range, a name), else in [fixed]. A preset replaces the settings
-    that it defines. VALUE is TOML, or bare text such as 3:8, P or sine-fit. `origin` tells where a
-    user's model comes from.
+    key of exactly one other table but [decide]. A parameter is set in [grid] if it is already an
+    axis or if the value describes one (a list, a range, a name), else in [fixed]. A preset replaces
+    the settings that it defines. VALUE is TOML, or bare text such as 3:8, P or sine-fit. `origin`
+    tells where a user's model comes from.
     """
     changed = {key: dict(v) if isinstance(v, dict) else v for key, v in data.items()}
     for override in overrides:
@@ -108,7 +108,7 @@ def _place(
 def _table_of(data: Mapping[str, Any], key: str, origin: Origin | None) -> str:
     """Return the table, other than [grid] and [fixed], that has this bare key, if any."""
     new = renaming.FEATURES.get(key, key)
-    homes = [name for name, table in TABLES.items() if new in table.model_fields]
+    homes = [name for name, t in TABLES.items() if new in t.model_fields and name != "decide"]
     if len(homes) != 1 or key in {*data["grid"], *data["fixed"], "delta"}:
         return ""
     try:

@@ -113,6 +113,7 @@ FIGURES = {
     "reconstruction": "chimera_hpc.plot.synthetic:reconstruction_figure",
     "synthetic_signal": "chimera_hpc.plot.synthetic:signal_figure",
     "spectrum": "chimera_hpc.plot.spectrum:spectrum_figure",
+    "boundaries": "chimera_hpc.plot.boundaries:boundaries_figure",
 }
 """Functions of a `plot.figure_input.FigureInput` that return a matplotlib Figure, or None if the
 sweep has no data for the figure."""

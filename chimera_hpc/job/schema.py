@@ -40,8 +40,10 @@ def job_schema() -> dict[str, Any]:
         "anyOf": [known, _USER_MODEL],
         "description": properties["model"]["description"],
     }
-    for table in ("network", "continue"):
+    for table in ("decide", "network", "continue"):
         properties[table] = {"$ref": properties[table]["anyOf"][0]["$ref"]}
+    added = properties["added"]
+    properties["added"] = {**added["anyOf"][0], "description": added["description"]}
     for table in ("grid", "fixed"):
         del properties[table]["additionalProperties"]
         properties[table].pop("default", None)

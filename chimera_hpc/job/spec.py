@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from hashlib import blake2b
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -28,11 +26,13 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.renaming import with_new_names
 from chimera_hpc.base.wording import short
 from chimera_hpc.job import registry
+from chimera_hpc.job.added import expand_added
 from chimera_hpc.job.axes import Axis, Values
 from chimera_hpc.job.chains import axis_names, check_chains, in_chains
 from chimera_hpc.job.checks import (
     Grid,
     axes_of,
+    check_added,
     check_nodes,
     check_points,
     check_tables,
@@ -40,11 +40,13 @@ from chimera_hpc.job.checks import (
     parsed,
 )
 from chimera_hpc.job.continue_table import ContinueTable
+from chimera_hpc.job.decide import Decide, check_first
+from chimera_hpc.job.digest import explain_difference, spec_digest
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.networks import check_sizes, observed_sizes
 from chimera_hpc.job.parameters import DELTA, DIRECTION, SEED, fixed_schema, grid_schema
-from chimera_hpc.job.points import DTYPES, Points, expand
+from chimera_hpc.job.points import DTYPES, Points, appended, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
 from chimera_hpc.job.selection import check_names, check_network_choices
 from chimera_hpc.job.table import Line, Table
@@ -58,14 +60,10 @@ from chimera_hpc.job.tables import (
     Slurm,
 )
 from chimera_hpc.job.user_models import Origin
-from chimera_hpc.models.parameters import ModelParameters
+from chimera_hpc.models.parameters import Column, ModelParameters
 
 _FOLDER_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"
-_OLD_NAMES = {new: old for old, new in renaming.FEATURES.items()}
 _KNOWN = {"model", "network"}
-_DIGESTED = ("model", "grid", "fixed", "integrator", "features")
-# Digests from before these keys existed must not change.
-_NEWER_FEATURES = {"max_windows": 0, "prominence": 0.0, "steady": "apart"}
 
 
 class Sweep(Table):
@@ -85,6 +83,9 @@ class Sweep(Table):
     network: NetworkTable | None = Field(
         None, validate_default=True, description="The network of oscillators."
     )
+    decide: Decide | None = Field(
+        None, description="Runs are spent until the modal class of each cell is decided."
+    )
     grid: dict[str, Any] = Field(
         default_factory=dict,
         validate_default=True,
@@ -96,6 +97,11 @@ class Sweep(Table):
         validate_default=True,
         description="Parameters of the model that are not axes.",
         json_schema_extra=fixed_schema(),
+    )
+    added: dict[str, list[int | float]] | None = Field(
+        None,
+        description="Cells beyond the grid, or with more seeds: a list per axis, and `seeds`, the "
+        "number of seeds of each cell. [decide] writes it.",
     )
     integrator: Integrator = Field(default_factory=Integrator)
     continue_: ContinueTable | None = Field(
@@ -222,18 +228,22 @@ class Sweep(Table):
 
     def explain_difference(self, other: Sweep) -> list[str]:
         """Return one line per digested key with a different value in `other`, the stored sweep."""
-        specs = (self.to_dict(), other.to_dict())
-        here, there = (_flat({**_digested(spec), "measures": spec["measures"]}) for spec in specs)
-        return [
-            f"{key}: {_shown(here.get(key))} here, {_shown(there.get(key))} in the store"
-            for key in {**here, **there}
-            if here.get(key) != there.get(key)
-        ]
+        return explain_difference(self.to_dict(), other.to_dict())
 
     def points(self) -> Points:
-        """Return all points. Axes are in order of declaration; the first varies slowest."""
+        """Return all points. Axes are in order of declaration; the first varies slowest.
+
+        Those of [added] that the grid has not come behind.
+        """
         axes, chains = self.axes, self.continue_
-        columns = expand(axes) if chains is None else in_chains(axes, chains)
+        points = self._points_of(expand(axes) if chains is None else in_chains(axes, chains))
+        if self.added is None:
+            return points
+        return appended(points, self._points_of(expand_added(self.added, points.axes[:-1])))
+
+    def _points_of(self, columns: dict[str, Column]) -> Points:
+        """Return points by the columns of the axes, with what is fixed."""
+        axes, chains = self.axes, self.continue_
         n_points = len(columns["seed"])
         model = self.parameters
         single = {**self.fixed, **model.constants, "delta": self.integrator.delta}
@@ -272,7 +282,10 @@ class Sweep(Table):
     def _normalise_grid(cls, grid: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         if not set(info.data) >= _KNOWN:
             return grid
-        return Grid.of(_parameters(info), grid)
+        decide = info.data.get("decide")
+        made = Grid.of(_parameters(info), {"seeds": decide.first, **grid} if decide else grid)
+        check_first(made, decide)
+        return made
 
     @field_validator("fixed", mode="before")
     @classmethod
@@ -299,6 +312,12 @@ class Sweep(Table):
             self._origin = info.context
         model, axes = self.parameters, self.axes
         check_points(model, axes, self.fixed)
+        if self.added is not None:
+            check_added(model, axes, self.fixed, self.added)
+        if self.decide is not None:
+            self.decide.check_axes(axes)
+        if self.continue_ is not None and (self.decide or self.added) is not None:
+            raise BadInput("decide: not with [continue], whose points need all of their chain")
         single = {name: Values((value,)) for name, value in self.fixed.items()}
         check_tables(self.integrator, self.features, model, {**single, **axes})
         if self.integrator.initial is not None and "delta" in axes:
@@ -332,40 +351,6 @@ def _values(axes: Mapping[str, Axis]) -> dict[str, Any]:
     return {name: axis.values for name, axis in axes.items() if isinstance(axis, Values)}
 
 
-def spec_digest(spec: Mapping[str, Any]) -> str:
-    """Return the digest of a sweep as `Sweep.to_dict` gave it.
-
-    The sweep may be from an earlier version of the package: newer keys do not enter the digest, and
-    renamed settings enter it under their old names.
-    """
-    data = _digested(spec)
-    data["features"] = {
-        _OLD_NAMES.get(key, key): value
-        for key, value in data["features"].items()
-        if _NEWER_FEATURES.get(key) != value
-    }
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return blake2b(text.encode(), digest_size=8).hexdigest()
-
-
-def _digested(spec: Mapping[str, Any]) -> dict[str, Any]:
-    data = {key: spec[key] for key in _DIGESTED}
-    data["features"] = {k: v for k, v in spec["features"].items() if k != "preset"}
-    if "delta" in spec["grid"]:
-        integrator = {key: value for key, value in spec["integrator"].items() if key != "delta"}
-        data["integrator"] = integrator
-    # Digests from before these tables existed must not change.
-    if "continue" in spec:
-        data["continue"] = spec["continue"]
-    data["integrator"] = {k: v for k, v in data["integrator"].items() if k != "initial"}
-    if "network" in spec:
-        data["network"] = {k: v for k, v in spec["network"].items() if k != "file"}
-    default = Measures().model_dump(mode="json", exclude_none=True)
-    if spec.get("measures", default) != default:
-        data["measures"] = spec["measures"]
-    return {**data, "order of axes": list(spec["grid"])}
-
-
 def _with_new_names(data: Any, where: str = "") -> Any:
     """Return a job with settings under their new names. With `where`, warn of each old name."""
     features = data.get("features") if isinstance(data, dict) else None
@@ -376,22 +361,3 @@ def _with_new_names(data: Any, where: str = "") -> Any:
 
 def _is_table(value: Any) -> bool:
     return isinstance(value, dict) and all(isinstance(key, str) for key in value)
-
-
-def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return every key as table.key with its value."""
-    flat: dict[str, Any] = {}
-    for key, value in data.items():
-        inner = value if isinstance(value, dict) else {"": value}
-        flat |= {f"{key}.{name}".rstrip("."): item for name, item in inner.items()}
-    return flat
-
-
-def _shown(value: Any) -> str:
-    """Return a value as text. A long list is shortened to its ends."""
-    if value is None:
-        return "nothing"
-    if isinstance(value, list):
-        few = value if len(value) <= 6 else [*value[:2], "...", value[-1]]
-        return f"[{', '.join(map(str, few))}]"
-    return str(value)

@@ -16,6 +16,7 @@ from pydantic import (
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.continue_table import ContinueTable
+from chimera_hpc.job.decide import Decide
 from chimera_hpc.job.initial_file import read_initial
 from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.registry import (
@@ -360,6 +361,7 @@ class Slurm(Table):
 
 
 TABLES: dict[str, type[Table]] = {
+    "decide": Decide,
     "network": NetworkTable,
     "integrator": Integrator,
     "continue": ContinueTable,

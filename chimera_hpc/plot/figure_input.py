@@ -70,6 +70,8 @@ class FigureInput:
     """For each cut, how often a cell (n_cells,) keeps its modal class; empty without an audit."""
     curves: Mapping[str, Any] = field(default_factory=dict)
     """Results of the analyses, as in results.json."""
+    decided: Mapping[str, Any] = field(default_factory=dict)
+    """``decide`` and ``boundaries`` of results.json; empty for a job without [decide]."""
     beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """``curves`` of the sweeps that are drawn with this one, by their names."""
     shown: Sequence[DrawnRun] = ()

@@ -17,15 +17,16 @@ from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.classify.modes import run_names
+from chimera_hpc.job.class_names import naming_rule
 from chimera_hpc.reduction.agreement_text import agreement_lines, cluster_lines
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
-from chimera_hpc.reduction.names import naming_rule
+from chimera_hpc.reduction.decided import decided_lines, decided_results
 from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import reduction_variables
-from chimera_hpc.reduction.results import TRIPLET, build_results, to_json
+from chimera_hpc.reduction.results import TRIPLET, build_results, json_safe, to_json
 from chimera_hpc.reduction.selection import check_selections
 from chimera_hpc.reduction.stability import one_state, tree_warnings
 from chimera_hpc.reduction.table import class_table
@@ -133,6 +134,7 @@ class _Work:
         self.results: dict[str, Any] = {}
         self.curves: dict[str, Any] = {}
         self.atlases: dict[str, Atlas] = {}
+        self.decided: dict[str, Any] = {}
         self.table = ""
 
     def note(self, line: str) -> None:
@@ -164,6 +166,9 @@ class _Work:
             *tree_warnings(made),
         ]
         self.curves = self.results["curves"]
+        if self.convention == OWN:
+            self.decided = json_safe(decided_results(store, made.cuts[self.cuts[0]], self.status))
+        self.results |= self.decided
         audit, line = kept_audit(self.place, self._basis)
         self.results |= audit
         if line:
@@ -294,6 +299,7 @@ class _Work:
             axes=[(axis.symbol, axis.values) for axis in self.axes],
             cells={k: self.results["cuts"][str(k)]["cells"] for k in self.cuts},
             curves=self.curves,
+            decided=self.decided,
             kept=self._kept(),
             beside=curves_beside(
                 self.folder, store.sweep.reduction.beside, self.note, self.convention
@@ -315,6 +321,8 @@ class _Work:
         if self.convention != OWN:
             self._say(f"convention {self.convention}:")
         for line in self.table.splitlines():
+            self._say(line)
+        for line in decided_lines(self.decided, self.axes):
             self._say(line)
         if "agreement" in self.curves:
             for line in agreement_lines(self.curves["agreement"]):

@@ -14,13 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
+from chimera_hpc.classify.classification import TRIPLET as TRIPLET
 from chimera_hpc.classify.classification import Classification, Cut
 from chimera_hpc.classify.modes import CellTable, modal_classes
 from chimera_hpc.reduction.quality import POOR_FIT, class_fits, describe_quality
 from chimera_hpc.store.schema import QUALITY
 
 SCHEMA = 1
-TRIPLET = ("V_theta", "V_a", "V_Omega")
 
 
 class NamedSweep(Protocol):

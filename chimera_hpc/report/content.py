@@ -16,8 +16,8 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Classification, Cut, classify, has_triplet
 from chimera_hpc.classify.modes import count_votes, modal_votes, vote_labels
 from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
+from chimera_hpc.job.class_names import naming_rule
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
-from chimera_hpc.reduction.names import naming_rule
 from chimera_hpc.reduction.reduction import RESULTS
 from chimera_hpc.reduction.results import TRIPLET, count_points, read_results
 from chimera_hpc.store.labelled import STORE_NAME

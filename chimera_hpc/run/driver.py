@@ -106,7 +106,33 @@ class Driver:
             True, attempts=retry.attempts, statuses=retry.statuses, before=retry.before
         )
         index, count = self.executor.share or (0, 1)
-        return [b for b in blocks if b not in self.broken and b % count == index]
+        left = [b for b in blocks if b not in self.broken]
+        if self.store.sweep.decide is not None:
+            # All shares are needed before the next round: own blocks first, then any.
+            return sorted(left, key=lambda b: (b - index) % count)
+        return [b for b in left if b % count == index]
+
+    def next_round(self) -> bool:
+        """Add the points of the next round of a sweep with [decide]; return whether there are any.
+
+        Others may have added them already.
+        """
+        if self.store.sweep.decide is None or self.broken or self.should_stop():
+            return False
+        from chimera_hpc.run.rounds import next_round
+
+        began, before = time.perf_counter(), self.store.n_points
+        store = next_round(self.store)
+        if store is None:
+            return False
+        self.store = store
+        seconds = time.perf_counter() - began
+        self.reporter.grow(store.n_points)
+        self.reporter.say(
+            f"round {len(store.sweeps)}: {store.n_points - before} points more, "
+            f"{store.n_points} in all ({seconds:.1f} s)"
+        )
+        return True
 
     def _count(self) -> None:
         """Have the reporter count what the ledger says, by whichever run."""
@@ -122,6 +148,8 @@ class Driver:
             for line in store.repair():
                 say(line)
             blocks = self.pending()
+            if not blocks and self.next_round():
+                blocks = self.pending()
             self._count()
             if not blocks:
                 say("nothing to compute")
@@ -245,6 +273,8 @@ class Driver:
         while not self.should_stop():
             blocks = self.pending()
             if not blocks:
+                if self.next_round():
+                    continue
                 return
             self._count()
             others = live_claims(self.store.path)

@@ -84,6 +84,12 @@ class Reporter:
                 self._log.close()
             self._log = None
 
+    def grow(self, total: int) -> None:
+        """Count up to another total."""
+        self.total = total
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, total=total)
+
     def count(self, done: int, failed: int) -> None:
         """Take over the number of points that need nothing more, and of those that failed."""
         self.done, self.failed = done, failed

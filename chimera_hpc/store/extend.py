@@ -17,8 +17,9 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import sync_tree, write_atomically
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.chains import followed
+from chimera_hpc.job.points import point_keys
 from chimera_hpc.job.states import largest_state
-from chimera_hpc.job.together import point_keys, points_of
+from chimera_hpc.job.together import points_of
 from chimera_hpc.store.claims import claim_block
 from chimera_hpc.store.ledger import METADATA
 from chimera_hpc.store.schema import BLOCK_ARRAYS

@@ -18,7 +18,8 @@ from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.chains import followed
-from chimera_hpc.job.together import point_keys, points_of
+from chimera_hpc.job.points import point_keys
+from chimera_hpc.job.together import points_of
 from chimera_hpc.store.blocks import BlockFiles
 from chimera_hpc.store.extend import SAME_TABLES
 from chimera_hpc.store.ledger import FIELDS

@@ -45,7 +45,7 @@ from chimera_hpc.store.write import Receipt, write_block
 if TYPE_CHECKING:
     from chimera_hpc.store.block_result import BlockResult
 
-_FREE_TABLES = ("name", "title", "reduction", "run", "slurm")
+_FREE_TABLES = ("name", "title", "decide", "reduction", "run", "slurm")
 """What a job may change between two runs on one store."""
 
 

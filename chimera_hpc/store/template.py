@@ -25,8 +25,8 @@ from chimera_hpc.base.files import (
 )
 from chimera_hpc.base.streams import STREAM_TAG
 from chimera_hpc.job import Points, Sweep, block_size
+from chimera_hpc.job.digest import spec_digest
 from chimera_hpc.job.models import model_folder
-from chimera_hpc.job.spec import spec_digest
 from chimera_hpc.job.user_models import Origin
 from chimera_hpc.store.ledger import (
     METADATA,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from chimera_hpc.reduction.names import naming_rule
 
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.shipped import jobs_folder
-from chimera_hpc.reduction.names import naming_rule
 
 JOBS = jobs_folder()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from chimera_hpc.classify.naming import LETTERS, TRIPLET, Rule
-from chimera_hpc.job import Sweep
+from chimera_hpc.job.spec import Sweep
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.conventions import PRESETS
 

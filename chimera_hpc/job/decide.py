@@ -1,0 +1,91 @@
+"""The table [decide]: runs are spent until classes are decided and their boundaries are found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import nearest, short
+from chimera_hpc.job.axes import Axis, Between, Same
+from chimera_hpc.job.points import as_array
+from chimera_hpc.job.table import Table
+
+Runs = Annotated[int, Field(ge=1, le=10**6)]
+
+
+class Decide(Table):
+    """How many runs a cell gets, and which cells are added; `grid.seeds` is `first`."""
+
+    confidence: float = Field(
+        0.95,
+        gt=0.5,
+        lt=1,
+        description="The modal class of a cell is decided when the posterior probability that it "
+        "leads all others exceeds this.",
+    )
+    first: Runs = Field(5, description="Seeds that every cell gets.")
+    batch: Runs = Field(5, description="Further seeds per round of a cell that is not decided.")
+    most: Runs = Field(100, description="Most seeds of a cell; one still open then is undecided.")
+    judge: Literal["frozen"] = Field(
+        "frozen", description="Classes come from the tree over the runs of the first round."
+    )
+    refine: dict[str, int | float] = Field(
+        default_factory=dict,
+        description="Smallest distance by axis: between neighbouring cells whose decided classes "
+        "differ further cells are added, halfway, down to this distance.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.most < self.first:
+            raise BadInput(f"decide.most: {self.most} is below decide.first = {self.first}")
+        for name, distance in self.refine.items():
+            if not distance > 0:
+                raise BadInput(f"decide.refine.{name}: {short(distance)} is not above 0")
+        return self
+
+    def check_axes(self, axes: Mapping[str, Axis]) -> None:
+        """Raise BadInput for an axis to refine that is none, follows another, or is too fine."""
+        for name, distance in self.refine.items():
+            axis = axes.get(name) if name != "seed" else None
+            known = [other for other in axes if other != "seed"]
+            if axis is None:
+                raise BadInput(f"decide.refine.{name}: not an axis in [grid]{nearest(name, known)}")
+            if isinstance(axis, Same):
+                text = f"follows {axis.name}; refine {axis.name}"
+                raise BadInput(f"decide.refine.{name}: {text}")
+            whole = isinstance(axis, Between) or as_array(axis).dtype.kind == "i"
+            if whole and not isinstance(distance, int):
+                text = f"{short(distance)} is not an integer, as the values of {name} are"
+                raise BadInput(f"decide.refine.{name}: {text}")
+
+    def full_grid(self, axes: Mapping[str, Axis], n_cells: int) -> int:
+        """Return the runs of a full grid: `n_cells`, each refined axis filled, `most` seeds each.
+
+        A range whose ends depend on others is filled by its step.
+        """
+        more = math.prod(_filling(axes[name], distance) for name, distance in self.refine.items())
+        return round(n_cells * more) * self.most
+
+
+def _filling(axis: Axis, distance: float) -> float:
+    """Return how many times as many values an axis has when it is filled down to a distance."""
+    if isinstance(axis, Between):
+        return max(1.0, axis.step / distance)
+    assert not isinstance(axis, Same)
+    values = as_array(axis)
+    length = float(values.max() - values.min())
+    return max(1.0, (math.floor(length / distance + 1e-9) + 1) / len(values))
+
+
+def check_first(grid: Mapping[str, Any], decide: Decide | None) -> None:
+    """Raise BadInput for a number of seeds in [grid] that [decide] contradicts."""
+    if decide is not None and grid["seeds"] != decide.first:
+        raise BadInput(
+            f"grid.seeds: {short(grid['seeds'])}, but with [decide] every cell has decide.first = "
+            f"{decide.first} seeds in the first round; leave seeds out, or set both to the same"
+        )

@@ -1,0 +1,141 @@
+"""A sweep with [decide] from the command line: rounds by every executor, and what is said."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jobs_for_tests import SMALL, job_text
+
+from chimera_hpc.classify.classification import Classification, Cut
+from chimera_hpc.job.points import point_keys
+from chimera_hpc.plot.boundaries import boundaries_figure
+from chimera_hpc.plot.figure_input import FigureInput
+from chimera_hpc.store.store import Store
+from chimera_hpc.sweep import main
+
+JOB = {key: value for key, value in SMALL.items() if key != "grid.seeds"} | {
+    "grid.P": [2, 5],
+    "grid.Q": "0:2",
+    "decide.first": 4,
+    "decide.batch": 3,
+    "decide.most": 10,
+    "decide.confidence": 0.9,
+    "decide.refine": {"P": 1},
+}
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def decided(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("decided")
+    (folder / "job.toml").write_text(job_text(JOB))
+    words = ["run", str(folder / "job.toml"), "--out", str(folder / "sweep")]
+    assert main([*words, "--cluster", "serial", "--no-figures"]) == 0
+    return folder
+
+
+def results(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "results.json").read_bytes())
+    return found
+
+
+def same(folder: Path, other: Path) -> bool:
+    ours, theirs = (Store.open(place / "store.zarr") for place in (folder, other))
+    keys = point_keys(ours.points).tolist() == point_keys(theirs.points).tolist()
+    digests = ours.ledger()["digest"].tolist() == theirs.ledger()["digest"].tolist()
+    return keys and digests and ours.sweep.digest == theirs.sweep.digest
+
+
+def test_results_hold_cells_and_boundaries(decided):
+    found, store = results(decided / "sweep"), Store.open(decided / "sweep" / "store.zarr")
+    decide = found["decide"]
+    assert decide["rounds"] == len(store.sweeps) > 1
+    assert decide["runs"] == store.n_points < decide["full_grid"] == 12 * 10
+    assert sum(cell["runs"] for cell in decide["cells"]) == store.n_points
+    assert {0.0 <= decide["agreement"][key] <= 1.0 for key in ("runs", "cells")} == {True}
+    for cell in decide["cells"]:
+        low, high = cell["interval"]
+        assert set(cell) == {"P", "Q", "class", "decided", "runs", "share", "interval"}
+        assert low <= cell["share"] <= high
+        assert 4 <= cell["runs"] <= 10
+        assert cell["decided"] or cell["runs"] == 10
+    classes = {(c["P"], c["Q"]): c["class"] for c in decide["cells"] if c["decided"]}
+    for boundary in found["boundaries"]:
+        low, high = boundary["interval"]
+        ends = [classes[P, boundary["Q"]] for P in (low, high)]
+        assert boundary["between"] == ends
+        assert ends[0] != ends[1]
+        assert boundary["at"] == (low + high) / 2
+        inner = [P for (P, Q) in classes if boundary["Q"] == Q and low < P < high]
+        assert boundary["axis"] == "P"
+        assert inner == []
+
+
+def test_finished_sweep_has_nothing_to_compute(decided, sweep: Run):
+    before = results(decided / "sweep")
+    words = ("--out", decided / "sweep", "--cluster", "serial", "--no-figures")
+    code, out, err = sweep("run", decided / "job.toml", *words)
+    assert code == 0
+    assert "nothing to compute" in err
+    assert "cells at 90 %" in out
+    assert results(decided / "sweep") == before
+
+
+def test_status_and_plan_tell_rounds_and_runs(decided, sweep: Run, tmp_path):
+    decide = results(decided / "sweep")["decide"]
+    code, out, _ = sweep("status", decided / "sweep", "--json")
+    state = json.loads(out)["decide"]
+    assert code == 0
+    n_decided = sum(cell["decided"] for cell in decide["cells"])
+    assert state == {
+        "rounds": decide["rounds"],
+        "cells": len(decide["cells"]),
+        "decided": n_decided,
+        "undecided": len(decide["cells"]) - n_decided,
+        "runs": decide["runs"],
+        "full_grid": 120,
+        "expected_runs": decide["runs"],
+    }
+    _, out, _ = sweep("status", decided / "sweep")
+    assert f"round {decide['rounds']}: {n_decided} of {len(decide['cells'])} cells decided" in out
+    _, out, _ = sweep("plan", decided / "job.toml", "--out", tmp_path / "none")
+    assert "at best 24 runs, expected unknown before the first round, at worst 120" in out
+    _, out, _ = sweep("plan", decided / "job.toml", "--out", decided / "sweep")
+    assert f"expected about {decide['runs']}" in out
+
+
+def test_shares_do_the_rounds_together(decided, sweep: Run, tmp_path):
+    for index in (1, 0):
+        words = ("--of", "2", "--index", index, "--out", tmp_path / "sweep")
+        code, out, _ = sweep("shard", decided / "job.toml", *words)
+        assert code == 0
+        assert out == f"share {index} of 2: done\n"
+    assert same(tmp_path / "sweep", decided / "sweep")
+
+
+def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
+    words = ("--out", tmp_path / "sweep", "--workers", "2", "--no-figures")
+    code, _, _ = sweep("run", decided / "job.toml", *words)
+    assert code == 0
+    assert same(tmp_path / "sweep", decided / "sweep")
+    assert results(tmp_path / "sweep")["decide"] == results(decided / "sweep")["decide"]
+
+
+def test_figure_has_a_bar_per_boundary_and_open_markers(decided):
+    found = results(decided / "sweep")
+    cells = found["decide"]["cells"]
+    cut = Cut(*[None] * 6)
+    axes = [(f"${name}$", [cell[name] for cell in cells]) for name in ("P", "Q")]
+    data = FigureInput(Classification(*[cut] * 9), None, axes, {}, decided=found)
+    figure = boundaries_figure(data)
+    assert figure is not None
+    (panel,) = figure.axes
+    markers = sum(len(part.get_offsets()) for part in panel.collections if part.get_label())
+    assert len(panel.containers) == len(found["boundaries"])
+    assert markers >= len(cells)
+    line = boundaries_figure(FigureInput(Classification(*[cut] * 9), None, axes[:1], {}))
+    assert line is None
