@@ -28,11 +28,12 @@ def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[s
 
     The other keys are ``class``, ``oscillating``, ``votes`` and ``entropy_bits``. Every run with a
     result has one vote: its class, ``steady``, or ``no_window`` (it varies, but too slowly or too
-    coarsely sampled to be classified). The modal class is taken over the runs that oscillate, and
-    ``oscillating`` is their share among the votes. Ties go to the class with more members in the
-    whole cut, then to the first in its order. A cell without an oscillating run is ``steady`` if
-    most of its runs are, else ``no_window``. A cell without a result has class None, share None and
-    no votes. The entropy -sum p log2 p is that of the votes.
+    coarsely sampled to be classified). The modal class is taken over the runs that have a class:
+    those that oscillate, and with ``steady = "level"`` the others too. ``oscillating`` is the share
+    of the runs that oscillate. Ties go to the class with more members in the whole cut, then to the
+    first in its order. A cell whose runs have no class is ``steady`` if most of them are, else
+    ``no_window``. A cell without a result has class None, share None and no votes. The entropy
+    -sum p log2 p is that of the votes.
     """
     cell_of_point, columns = points.cells()
     n_cells = max((len(column) for column in columns.values()), default=0)
@@ -40,7 +41,8 @@ def modal_classes(points: CellTable, status: ArrayLike, cut: Cut) -> list[dict[s
     votes = count_votes(cell_of_point, vote_labels(cut.labels, status, len(cut.names)), n_cells)
     votes = np.pad(votes, ((0, 0), (0, len(names) - votes.shape[1])))
     modal = modal_votes(votes, cut.sizes)
-    shares = votes[:, : len(cut.names)].sum(axis=1) / np.maximum(votes.sum(axis=1), 1)
+    moving = np.bincount(cell_of_point[np.asarray(status) == Status.DONE], minlength=n_cells)
+    shares = moving / np.maximum(votes.sum(axis=1), 1)
     entropy = entropy_bits(votes)
     found = []
     for i in range(n_cells):

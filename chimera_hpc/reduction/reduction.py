@@ -260,7 +260,7 @@ class _Work:
             self.note(f"classes by {self.classification.classifier}, not by the tree")
         for asked, cut in self.classification.cuts.items():
             if len(cut.names) < asked:
-                self.note(f"{asked} clusters: only {len(cut.names)}, of {members} oscillating runs")
+                self.note(f"{asked} clusters: only {len(cut.names)}, of {members} clustered runs")
 
     def draw(self) -> tuple[Path, ...]:
         from chimera_hpc.plot.catalogue import choose

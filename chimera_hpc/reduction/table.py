@@ -24,7 +24,7 @@ _NOTHING = "."
 def class_table(
     cuts: Mapping[str, Cells], axes: Sequence[FreeAxis], poor: Collection[str] = ()
 ) -> str:
-    """Return the modal classes of the oscillating runs as text, with the share of these runs.
+    """Return the modal classes as text, with the share of the runs that oscillate.
 
     cuts: for each cut its cells with ``class`` and ``votes``, in one order (as in results.json).
         The first cut is the one that maps and counts show.
@@ -57,11 +57,11 @@ def _marked(cell: Mapping[str, Any], poor: Collection[str]) -> Mapping[str, Any]
 
 
 def _whose(cells: Cells) -> str:
-    """Say of which runs the modal classes are, where not every cell has a line with its share."""
+    """Say in how many cells runs oscillate, where not every cell has a line with its share."""
     shares = [cell["oscillating"] for cell in cells if cell["oscillating"] is not None]
     mixed = [share for share in shares if 0.0 < share < 1.0]
     none = sum(share == 0.0 for share in shares)
-    text = f"modal class of the runs that oscillate: all in {len(shares) - len(mixed) - none} cells"
+    text = f"runs that oscillate: all in {len(shares) - len(mixed) - none} cells"
     if mixed:
         text += f", {min(mixed):.0%} to {max(mixed):.0%} of them in {len(mixed)}"
     return text + (f", none in {none}" if none else "")

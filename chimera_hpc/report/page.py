@@ -196,7 +196,8 @@ def _title(content: Content) -> str:
 def _words(content: Content, shown: Shown, pictures: str) -> dict[str, str]:
     counts = content.counts
     tried = counts["total"] - counts["pending"]
-    n_cells, done = content.n_cells, counts["done"]
+    n_cells, clustered = content.n_cells, int(content.cuts[content.first_cut].sizes.sum())
+    kind = "" if content.store.sweep.features.steady == "level" else "oscillating "
     n_shown, n_drawn = len(shown.cells), len(shown.points)
     seeds = len(np.unique(content.store.points.columns["seed"]))
     return {
@@ -210,9 +211,10 @@ def _words(content: Content, shown: Shown, pictures: str) -> dict[str, str]:
         "map": f"{n_shown} of {n_cells} cells are on the map, spread evenly."
         if n_shown < n_cells
         else "",
-        "projections": f"{n_drawn} of {done} oscillating runs, spread evenly."
-        if n_drawn < done
-        else f"All {done} oscillating runs.",
+        "voters": f"{kind}runs",
+        "projections": f"{n_drawn} of {clustered} {kind}runs, spread evenly."
+        if n_drawn < clustered
+        else f"All {clustered} {kind}runs.",
         "sampled": " The tree is grown over a sample; all other runs took the class of the nearest "
         "run in it."
         if content.classification.sampled

@@ -81,6 +81,7 @@ def payload(content: Content, shown: Shown, plates: Plates, top: TreeTop) -> dic
 
 def _cells(content: Content, shown: Shown) -> dict[str, Any]:
     results = content.count(*(code for code in Status if code.is_result))
+    oscillating = content.count(Status.DONE)
     failed = content.count(*(code for code in Status if code.is_failure))
     total = np.bincount(content.cell, minlength=content.n_cells)
     place = [np.unique(axis.values, return_inverse=True)[1] for axis in content.axes]
@@ -89,6 +90,7 @@ def _cells(content: Content, shown: Shown) -> dict[str, Any]:
         "place": [p[shown.cells].tolist() for p in place] or [[0] * len(shown.cells)],
         "total": total[shown.cells].tolist(),
         "results": results[shown.cells].tolist(),
+        "oscillating": oscillating[shown.cells].tolist(),
         "failed": failed[shown.cells].tolist(),
     }
 

@@ -58,6 +58,11 @@ def test_steady_runs_vote_but_do_not_decide(table: Any) -> None:
     assert cell["votes"] == {"chimera": 1, "steady": 3}
 
 
+def test_runs_with_a_class_decide_even_if_they_do_not_oscillate(table: Any) -> None:
+    cell = one_cell(table, [0, 0, 1, 0], [S, W, D, D])
+    assert (cell["class"], cell["oscillating"]) == ("ordered", 0.5)
+
+
 def test_cell_with_steady_runs_only_is_steady(table: Any) -> None:
     cell = one_cell(table, [-1, -1], [S, S])
     assert (cell["class"], cell["oscillating"]) == ("steady", 0.0)

@@ -142,8 +142,8 @@ def test_fewer_runs_than_clusters_is_said_for_each_cut(tmp_path):
     filled(tmp_path, FAST, "grid.seeds=1", "reduction.cuts=[2,3,5]", status={3: Status.STEADY})
     summary, _ = told(tmp_path)
     assert summary.notes == (
-        "3 clusters: only 2, of 2 oscillating runs",
-        "5 clusters: only 2, of 2 oscillating runs",
+        "3 clusters: only 2, of 2 clustered runs",
+        "5 clusters: only 2, of 2 clustered runs",
     )
     assert len(results_in(tmp_path)["cuts"]["5"]["clusters"]) == 2
 
@@ -496,7 +496,7 @@ def test_table_of_many_values_lists_stretches():
     assert table.splitlines() == [
         "ordered  flips: 0-39, 41-70",
         "chimera  flips: 40",
-        "modal class of the runs that oscillate: all in 71 cells",
+        "runs that oscillate: all in 71 cells",
     ]
 
 
@@ -512,7 +512,7 @@ def test_table_of_two_axes_is_a_map_with_the_second_axis_upwards():
         "0  d  s",
         "   3 10  P",
         "c chimera, d disordered, s steady",
-        "modal class of the runs that oscillate: all in 1 cells, 5% to 5% of them in 1, none in 1",
+        "runs that oscillate: all in 1 cells, 5% to 5% of them in 1, none in 1",
     ]
 
 
@@ -532,7 +532,7 @@ def test_table_too_large_for_the_terminal_counts_cells(shape):
     assert table.splitlines() == [
         f"{half:8d} cells ordered",
         f"{half:8d} cells chimera",
-        f"modal class of the runs that oscillate: all in {2 * half} cells",
+        f"runs that oscillate: all in {2 * half} cells",
     ]
 
 

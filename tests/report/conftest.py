@@ -26,7 +26,7 @@ def fill(
     failed: Sequence[int] = (),
     steady: Sequence[int] = (),
 ) -> Store:
-    """Fill the small store; `failed` and `steady` are points."""
+    """Fill the small store; `failed` and `steady` are points. Steady ones may have a triplet."""
     store = make_store(folder, *overrides)
     store.start_run({"package": {"name": "chimera_hpc", "version": "0"}, "started": "today"})
     columns = store.points.columns
@@ -40,6 +40,8 @@ def fill(
             if point in failed or point in steady:
                 made.status[row] = Status.TIME_OUT if point in failed else Status.STEADY
                 made.features[row] = made.scalars[row, :3] = np.nan
+            if point in steady and store.sweep.features.steady == "level":
+                made.scalars[row, :3] = 0.0, 0.03, 0.0
         store.write_block(block, made, 1, 1)
     return store
 

@@ -100,6 +100,17 @@ def test_votes_and_classes_are_those_of_the_results(tmp_path, filled):
             assert data["cells"]["name"][row] == f"P = {cell['P']}, Q = {cell['Q']}"
 
 
+def test_steady_runs_may_vote_but_do_not_oscillate(tmp_path, filled):
+    filled(tmp_path, *PLANE, "features.steady=level", steady=[0, 2, 3])
+    reduce_sweep(tmp_path)
+    cells = json.loads((tmp_path / "results.json").read_text())["cuts"]["3"]["cells"]
+    assert [cell["oscillating"] for cell in cells[:3]] == [0.5, 0.0, 1.0]
+    page = page_of(tmp_path)
+    assert data_of(page)["cells"]["oscillating"][:3] == [1, 0, 2]
+    assert "All 24 runs." in words_of(page)
+    assert "Each cell has the class of most of its runs:" in words_of(page)
+
+
 def test_cut_can_be_moved_from_two_clusters_to_eight(tmp_path, filled):
     filled(tmp_path, *PLANE)
     data = data_of(page_of(tmp_path))

@@ -27,8 +27,8 @@
   }
 
   function shareText(row) {
-    const votes = cut().votes[row], total = sum(votes);
-    return total ? `${Math.round(100 * sum(votes.slice(0, cut().sizes.length)) / total)} %` : "";
+    const total = cells.results[row];
+    return total ? `${Math.round(100 * cells.oscillating[row] / total)} %` : "";
   }
 
   function runsText(row) {
