@@ -10,6 +10,7 @@ from chimera_hpc.cli.deciding import plan_line
 from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, memory_lines, refuse_absurd
 from chimera_hpc.cli.run import check_drawing
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.class_names import overridden
 from chimera_hpc.job.models import build
 
 EPILOG = """examples:
@@ -45,6 +46,8 @@ def execute(args: Namespace) -> int:
     print(f"store       {in_bytes(need.bytes)} at most")
     print(f"work        about {in_time(need.seconds)} on one core")
     print("\n".join(memory_lines(need)))
+    for line in overridden(sweep.features):
+        print(f"warning: {line}")
     refuse_absurd(sweep, need, folder, args.yes)
     return Exit.COMPLETE
 

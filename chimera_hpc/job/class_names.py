@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 from chimera_hpc.classify.naming import LETTERS, TRIPLET, Rule
 from chimera_hpc.job.spec import Sweep
 from chimera_hpc.job.tables import Features
@@ -32,3 +34,16 @@ def _is_preset(features: Features) -> bool:
         all(getattr(features, key) == value for key, value in preset.items())
         for preset in PRESETS.values()
     )
+
+
+def overridden(features: Features) -> list[str]:
+    """Return a line if a job replaces what its preset sets: no preset may be left."""
+    preset = PRESETS[features.preset]
+    given = {key: getattr(features, key) for key in preset}
+    other = [f"{k} = {json.dumps(v)}" for k, v in given.items() if v != preset[k]]
+    if not other or features.preset == "default":
+        return []
+    return [
+        f'features.preset = "{features.preset}", but the job itself sets {", ".join(other)}: '
+        "only keys that a job leaves out are set by the preset"
+    ]

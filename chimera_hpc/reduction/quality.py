@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Cut
+from chimera_hpc.classify.naming import CLASSES
 from chimera_hpc.job import Sweep
 from chimera_hpc.measures.quality import FEW_SAMPLES
 
@@ -68,8 +69,9 @@ def quality_warnings(
     """Return a line for each thing that is measured badly, with what to type."""
     step = sweep.integrator.t_step
     few = _few_samples(describe_quality(quality)["samples_per_period"], step)
-    slow = _no_window(sweep, np.asarray(status))
+    slow = _no_window(sweep, np.asarray(status), cuts)
     still = _all_steady(sweep, np.asarray(status), scalars.get("std_u"))
+    level = _level_classes(np.asarray(status), cuts)
     poor: dict[str, float] = {}
     for cut in cuts.values():
         poor = {**poor_classes(cut, quality["r_squared"]), **poor}
@@ -78,7 +80,7 @@ def quality_warnings(
         f"R^2 of its runs), as it does of noise (below {POOR_FIT:.0%}); look at runs with `show`"
         for name, fit in poor.items()
     ]
-    return [*few, *slow, *still, *fits]
+    return [*few, *slow, *still, *level, *fits]
 
 
 def _few_samples(entry: Mapping[str, Any], step: float) -> list[str]:
@@ -93,14 +95,18 @@ def _few_samples(entry: Mapping[str, Any], step: float) -> list[str]:
     ]
 
 
-def _no_window(sweep: Sweep, status: NDArray[Any]) -> list[str]:
+def _no_window(sweep: Sweep, status: NDArray[Any], cuts: Mapping[int, Cut]) -> list[str]:
     count = int(np.count_nonzero(status == Status.NO_WINDOW))
     if not count:
         return []
     measured = np.isin(status, [int(code) for code in Status if code.is_result]).sum()
+    slow = status == Status.NO_WINDOW
+    no_class = (
+        "" if any((cut.labels[slow] >= 0).any() for cut in cuts.values()) else " and no class"
+    )
     return [
         f"{_share(count, int(measured), 'points')} have fewer than features.n_peaks = "
-        f"{sweep.features.n_peaks} maxima and no class: they are too slow for the analysis, or "
+        f"{sweep.features.n_peaks} maxima{no_class}: they are too slow for the analysis, or "
         f"sampled too coarsely; run again with a larger integrator.t_end than "
         f"{sweep.integrator.t_end:g} or a smaller integrator.t_step than "
         f"{sweep.integrator.t_step:g}"
@@ -120,6 +126,22 @@ def _all_steady(sweep: Sweep, status: NDArray[Any], deviation: ArrayLike | None)
         f"limit, features.steady_threshold = {sweep.features.steady_threshold:g}, has the unit of "
         f"u; if they oscillate, run again with --set features.steady_threshold="
         f"{_round_down(0.01 * largest):g} and another --out"
+    ]
+
+
+def _level_classes(status: NDArray[Any], cuts: Mapping[int, Cut]) -> list[str]:
+    """Return a line if classes of runs at rest have names of a motion (`steady = "level"`)."""
+    found = {
+        name: None
+        for cut in cuts.values()
+        for label, (name, family) in enumerate(zip(cut.names, cut.families, strict=True))
+        if family in CLASSES[1:] and not (status[cut.labels == label] == Status.DONE).any()
+    }
+    if not found:
+        return []
+    return [
+        f"no run of the class {' or '.join(found)} oscillates: runs at rest are clustered by their "
+        "level, and the name does not describe a motion"
     ]
 
 

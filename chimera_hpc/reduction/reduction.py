@@ -17,7 +17,7 @@ from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, classify
 from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.classify.modes import run_names
-from chimera_hpc.job.class_names import naming_rule
+from chimera_hpc.job.class_names import naming_rule, overridden
 from chimera_hpc.reduction.agreement_text import agreement_lines, cluster_lines
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
@@ -161,6 +161,7 @@ class _Work:
         )
         measured = quality_warnings(store.sweep, self.status, self.scalars, self.quality, made.cuts)
         self.results["warnings"] = [
+            *overridden(store.sweep.features),
             *one_state(self.triplets, made),
             *measured,
             *tree_warnings(made),
