@@ -107,13 +107,18 @@ def _number_of_clusters(text: str) -> Any:
 
 def _answer(args: Namespace) -> list[str]:
     from chimera_hpc.cli.classified import draw, draw_sheet, lines, report, report_all, table
+    from chimera_hpc.measures.checks import choice
+    from chimera_hpc.measures.conventions import PRESETS
     from chimera_hpc.recordings.file import Treatment, measure_file
     from chimera_hpc.recordings.judge import Judge
     from chimera_hpc.recordings.many import measure_files, recording_files
 
+    if args.preset is not None:
+        choice("--preset", args.preset, tuple(PRESETS))
     paths = recording_files(args.files)
     judge = None if args.atlas is None else Judge.load(args.atlas, args.preset)
     settings = _settings(args.overrides, judge, args.preset)
+    keys = [text.partition("=")[0].strip().removeprefix("features.") for text in args.overrides]
     how = Treatment(
         choice=_choice(args),
         step=args.step,
@@ -125,7 +130,7 @@ def _answer(args: Namespace) -> list[str]:
         lowpass=args.lowpass,
         ring=not args.open,
         links=args.links,
-        absolute=any(name in text for text in args.overrides for name in ("still", "steady")),
+        absolute=not {"still", "steady_threshold"}.isdisjoint(keys),
     )
     if paths == args.files and len(paths) == 1 and args.clusters is None:
         one = measure_file(paths[0], how, settings, judge)

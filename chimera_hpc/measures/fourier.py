@@ -47,6 +47,7 @@ from chimera_hpc.measures.signals_input import (
     check_node,
     check_windows,
     checked_signals,
+    suspect_prominence,
     suspect_signals,
     suspect_steadiness,
 )
@@ -195,7 +196,7 @@ def fourier_features(
     -----
     UserWarning
         A signal is constant among others or rises throughout, the axes of u seem to be swapped, or
-        a run is steady by `steady_threshold` only.
+        a run is steady by `steady_threshold` only or without a window by `prominence` only.
 
     Examples
     --------
@@ -229,8 +230,10 @@ def fourier_features(
     suspect = suspect_signals(rows)
     if features.status is Status.STEADY:
         suspect += suspect_steadiness(rows, features.deviation, steady_threshold)
+    if features.status is Status.NO_WINDOW:
+        suspect += suspect_prominence(rows, n_peaks, prominence)
     for line in suspect:
-        warnings.warn(f"fourier_features: {line}", UserWarning, stacklevel=3)
+        warnings.warn(f"fourier_features: {line}", UserWarning, stacklevel=4)
     return features
 
 

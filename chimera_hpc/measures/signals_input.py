@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.measures.checks import Array, floats, integer, node_rows
+from chimera_hpc.measures.windows import hidden_windows
 
 # Largest distance of a time from the uniform grid, in steps.
 _UNIFORM = 1e-2
@@ -87,6 +90,17 @@ def suspect_steadiness(x: Array, deviation: float, threshold: float) -> list[str
     ]
 
 
+def suspect_prominence(x: Array, n_peaks: int, prominence: float) -> list[str]:
+    """Return a line if an absolute limit left signals x (N, T) without a window."""
+    hidden = hidden_windows(x, n_peaks, prominence)
+    if not hidden.any():
+        return []
+    return [
+        f"{_columns(hidden)} has fewer than n_peaks = {n_peaks} maxima of prominence = "
+        f"{prominence:g}, which has the unit of u; pass a smaller prominence, 0 for all maxima"
+    ]
+
+
 def _columns(which: NDArray[np.bool_]) -> str:
     numbers = [str(i) for i in np.flatnonzero(which)[:_MOST_NAMED]]
     more = ", ..." if np.count_nonzero(which) > _MOST_NAMED else ""
@@ -114,7 +128,7 @@ def check_node(reference_node: int, n_nodes: int) -> int:
     return reference_node
 
 
-def check_height(name: str, value: float) -> None:
+def check_height(name: str, value: Any) -> None:
     """Raise BadInput unless a value in the unit of u is finite and not negative."""
-    if not 0.0 <= value < math.inf:
-        raise BadInput(f"{name} must be a finite number >= 0, not {value}")
+    if not (isinstance(value, Real) and 0.0 <= float(value) < math.inf):
+        raise BadInput(f"{name} must be a finite number >= 0, not {value!r}")

@@ -71,6 +71,14 @@ def maxima(x: NDArray[np.float64], prominence: float = 0.0, at_most: int | None 
     return found[: _find_maxima(x, prominence, found)]
 
 
+def hidden_windows(
+    signals: NDArray[np.float64], n_peaks: int, prominence: float
+) -> NDArray[np.bool_]:
+    """Whether each of signals (N, T) has a window only without the limit `prominence`."""
+    counts = [(len(maxima(x, prominence)), len(maxima(x))) for x in signals]
+    return np.array([few < n_peaks <= many for few, many in counts])
+
+
 def windows(peaks: Samples, n_peaks: int, n_overlap: int) -> tuple[Samples, Samples]:
     """First and last sample of each complete window over a list of maxima.
 

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job.tables import Features
 from chimera_hpc.network.network import Network
-from chimera_hpc.recordings.judge import Judge, Measured, features_of, measure, scale_to
+from chimera_hpc.recordings.judge import (
+    Judge,
+    Measured,
+    features_of,
+    measure,
+    scale_to,
+    with_relative_prominence,
+)
 from chimera_hpc.recordings.preparing import Prepared, in_order, prepare, with_times
 from chimera_hpc.recordings.read import read_recording
 from chimera_hpc.recordings.recording import Choice, Recording
@@ -71,7 +78,9 @@ def measure_file(path: Path, how: Treatment, settings: Features, judge: Judge | 
     try:
         recording = in_order(with_times(read, how.step), how.order)
         if how.rescale and judge is not None:
-            scale = scale_to(features_of(_prepared(recording, None, how, scale), settings), judge)
+            raw = _prepared(recording, None, how, scale)
+            relative = with_relative_prominence(raw, settings, judge)
+            scale = scale_to(features_of(raw, relative), judge)
         made = _prepared(recording, None if judge is None else judge.step, how, scale)
         pairs = how.pairs(made.u.shape[1])
         found = measure(made, settings, how.ring, judge, how.absolute, pairs)

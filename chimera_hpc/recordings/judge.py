@@ -15,12 +15,13 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.registry import MEASURES
 from chimera_hpc.job.tables import Features
-from chimera_hpc.measures.conventions import PRESETS
+from chimera_hpc.measures.conventions import preset_settings
 from chimera_hpc.measures.fourier import NodeFeatures, measure_signals
 from chimera_hpc.measures.quality import FEW_SAMPLES
 from chimera_hpc.measures.variation import total_variations
-from chimera_hpc.measures.windows import maxima
+from chimera_hpc.measures.windows import hidden_windows, maxima
 from chimera_hpc.recordings.columns import STILL, how_to_drop, some_of
 from chimera_hpc.recordings.gaps import called
 from chimera_hpc.recordings.preparing import Prepared
@@ -79,13 +80,14 @@ def _measured_by(folder: Path, sweep: Sweep, preset: str | None) -> tuple[Featur
     """Return the settings of a sweep's triplets under a preset, and the name of their atlas."""
     if preset is None:
         return sweep.features, OWN
-    settings = sweep.features.model_copy(update=dict(PRESETS[preset]))
+    settings = sweep.features.model_copy(update=dict(preset_settings(preset)))
     if settings == sweep.features:
         return settings, OWN
     if preset not in conventions(sweep):
+        other = f', or one with "{preset}" in [measures] panel' if preset in MEASURES else ""
         raise BadInput(
             f"--preset {preset}: the runs of {folder} were not measured by it; a sweep with "
-            f'[features] preset = "{preset}" is needed, or one with "{preset}" in [measures] panel'
+            f'[features] preset = "{preset}" is needed{other}'
         )
     return settings, preset
 
@@ -173,6 +175,7 @@ def measure(
                 f"{what} has {count:.3g} samples per period ({node}); below "
                 f"{FEW_SAMPLES:g} maxima and windows are placed coarsely"
             )
+    warnings += _hidden(made, settings, features)
     warnings += _noise(made, settings, features)
     warnings += _poor(made, settings, features)
     verdict = None
@@ -240,6 +243,14 @@ def verdict_of(atlas: Atlas, triplet: Array) -> Verdict:
     return Verdict(found.name[0], distance, confidence, name, far)
 
 
+def with_relative_prominence(made: Prepared, settings: Features, judge: Judge) -> Features:
+    """Return the settings with the prominence in the unit of a recording that is not scaled yet."""
+    amplitude = float(np.sqrt(2.0) * np.median(made.u.std(axis=0)))
+    return settings.model_copy(
+        update={"prominence": settings.prominence * amplitude / judge.amplitude}
+    )
+
+
 def scale_to(features: NodeFeatures, judge: Judge) -> tuple[float, float]:
     """Return the factors on times and signals that make their medians those of the atlas."""
     if features.status is not Status.DONE:
@@ -251,9 +262,20 @@ def scale_to(features: NodeFeatures, judge: Judge) -> tuple[float, float]:
     return frequency / judge.frequency, judge.amplitude / amplitude
 
 
+def _hidden(made: Prepared, settings: Features, features: NodeFeatures) -> list[str]:
+    """Return a line where nodes have no window because their maxima are too low to count."""
+    if features.status is not Status.NO_WINDOW:
+        return []
+    hidden = hidden_windows(np.ascontiguousarray(made.u.T), settings.n_peaks, settings.prominence)
+    names = [made.names[i] for i in np.flatnonzero(hidden)]
+    return [f"{some_of(names)}: fewer than n_peaks = {settings.n_peaks} maxima of prominence = "
+            f"{settings.prominence:g} in the unit of the signal: other units? --factors, --rescale "
+            "or --set prominence=X"] if names else []  # fmt: skip
+
+
 def _noise(made: Prepared, settings: Features, features: NodeFeatures) -> list[str]:
     """Return a line where the clock has many more maxima than turns: windows follow them."""
-    if features.status is not Status.DONE:
+    if features.status is not Status.DONE or settings.window_reference == "own":
         return []
     node = settings.reference_node
     count = len(maxima(np.ascontiguousarray(made.u[:, node]), settings.prominence))
@@ -276,8 +298,9 @@ def _poor(made: Prepared, settings: Features, features: NodeFeatures) -> list[st
     if 2 * np.sum((share < _POOR) & moving) > len(share):
         return [f"a sine holds only {float(np.median(share)):.0%} of the variance of the median "
                 "node: amplitudes, frequencies and phases say little"]  # fmt: skip
-    clock = max(float(features.frequency[settings.reference_node]), 1e-300)
-    turns = (settings.n_peaks - 1) * features.frequency / clock
+    own = settings.window_reference == "own"
+    clocks = features.frequency if own else features.frequency[settings.reference_node]
+    turns = (settings.n_peaks - 1) * features.frequency / np.maximum(clocks, 1e-300)
     poor = np.flatnonzero(((share < _POOR) | (turns < _TURNS)) & moving).tolist()
     names = [made.names[i] for i in poor]
     return [f"{some_of(names)}: a sine holds less than {_POOR:.0%} of the variance, or has fewer "

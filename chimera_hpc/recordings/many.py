@@ -15,6 +15,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.class_number import class_number, far_from_others, silhouettes
 from chimera_hpc.job.tables import Features
+from chimera_hpc.measures.conventions import preset_settings
 from chimera_hpc.recordings.file import Recorded, Treatment, measure_file
 from chimera_hpc.recordings.judge import Judge
 from chimera_hpc.recordings.read import is_zarr, known_ending
@@ -174,6 +175,7 @@ def classify_recordings(
     if atlas is not None and clusters != "auto":
         raise BadInput("clusters and atlas: one of them")
     words = [files] if isinstance(files, str | Path) else list(files)
+    preset_settings(preset or "default")
     judge = None if atlas is None else Judge.load(Path(atlas), preset)
     if settings is None:
         by_preset = Features.model_validate({"preset": preset or "default"})

@@ -149,6 +149,35 @@ def test_rescaling_takes_other_units_back(recorded: tuple[Path, Store, int], swe
         assert other["variations"][name] == pytest.approx(value, rel=0.02, abs=1e-3)
 
 
+def test_rescaling_takes_the_prominence_in_the_unit_of_the_atlas(
+    recorded: tuple[Path, Store, int], sweep: Sweep
+):
+    folder, store, i = recorded
+    np.savez("milli.npz", t=sample_times(store.sweep), u=1e-3 * store.series(i))
+    words = ("milli.npz", "--set", "prominence=0.1", "--atlas", folder)
+    assert as_json(sweep, *words, "--rescale")["status"] == "done"
+    found = as_json(sweep, *words)
+    assert found["status"] == "no_window"
+    assert any("maxima of prominence = 0.1 in the unit" in line for line in found["warnings"])
+
+
+@pytest.mark.parametrize("words", [(), ("--atlas",)])
+def test_an_unknown_preset_is_one_line(words: tuple[str, ...], finished: Path, sweep: Sweep):
+    np.savez("run.npz", t=ring()[0], u=ring()[1])
+    more = (*words, finished) if words else ()
+    code, _, error = sweep("classify", "run.npz", "--preset", "printed", *more)
+    assert code == 2
+    assert error == "error: --preset must be one of default, paper-printed, not 'printed'\n"
+
+
+def test_the_key_steady_does_not_set_the_threshold(sweep: Sweep):
+    t, u = ring()
+    np.savez("micro.npz", t=t, u=1e-4 * u)
+    assert as_json(sweep, "micro.npz", "--set", "steady=level")["status"] == "done"
+    words = ("--set", "features.steady_threshold=0.01")
+    assert as_json(sweep, "micro.npz", *words)["status"] == "steady"
+
+
 def test_factors_take_known_units_back_without_a_difference(
     recorded: tuple[Path, Store, int], sweep: Sweep
 ):

@@ -36,6 +36,13 @@ def broken(array, index, value):
         (T, U, {"time_origin": "0"}, "time_origin must be one of window, recording, absolute"),
         (T, U, {"steady_threshold": -1.0}, "steady_threshold must be a finite number >= 0"),
         (T, U, {"steady_threshold": float("nan")}, "steady_threshold must be"),
+        (
+            T,
+            U,
+            {"steady_threshold": None},
+            "steady_threshold must be a finite number >= 0, not None",
+        ),
+        (T, U, {"prominence": "0.1"}, "prominence must be a finite number >= 0, not '0.1'"),
         (T[:-1], U, {}, r"t must have shape \(2001,\), one time a row of u, not \(2000,\)"),
         (T[:, None], U, {}, "t must have shape"),
         (T, U[:, 0], {}, r"u must have shape \(times, nodes\), not \(2001,\)"),
@@ -80,12 +87,19 @@ def test_masked_array_without_a_masked_value_is_an_array():
         (np.column_stack([U, 0 * T]), {}, "column 3 of u never changes"),
         (np.column_stack([U, T]), {}, "column 3 of u rises or falls throughout"),
         (1e-6 * U, {}, "steady: .* which has the unit of u; .* pass steady_threshold=7e-09"),
+        (
+            U,
+            {"prominence": 9.0},
+            "column 0, 1, 2 of u has fewer than n_peaks = 10 .* the unit of u",
+        ),
+        (0.03 * U, {"preset": "paper-printed"}, "has fewer .* maxima of prominence = 0.1, which"),
     ],
 )
 def test_signals_that_look_like_none_are_named(u, options, message):
     with pytest.warns(UserWarning, match=message) as said:
         fourier_features(T, u, **options)
     assert [str(line.message).partition(":")[0] for line in said] == ["fourier_features"]
+    assert said[0].filename == __file__
 
 
 def test_axes_that_seem_to_be_swapped_are_named():

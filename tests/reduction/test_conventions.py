@@ -95,6 +95,12 @@ def test_recordings_are_judged_under_the_second_convention(both: Path, tmp_path:
         Judge.load(alone, "paper-printed")
 
 
+def test_recordings_are_not_judged_by_default_under_the_second_convention(tmp_path: Path) -> None:
+    printed = run(tmp_path / "a", "features.preset=paper-printed")
+    with pytest.raises(BadInput, match=r'\[features\] preset = "default" is needed$'):
+        Judge.load(printed, "default")
+
+
 def test_the_panel_belongs_to_the_digest() -> None:
     sweep = Sweep.from_toml_text(JOB)
     assert Sweep.from_toml_text(JOB, [BOTH]).digest != sweep.digest
