@@ -17,7 +17,7 @@ from chimera_hpc.classify.classification import Classification, Cut, has_triplet
 from chimera_hpc.classify.modes import run_names
 from chimera_hpc.classify.naming import CLASSES
 from chimera_hpc.job import Points, Sweep
-from chimera_hpc.reduction.names import is_papers_system
+from chimera_hpc.job.class_names import is_papers_system
 from chimera_hpc.reduction.results import TRIPLET
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from chimera_hpc.classify.agreement import adjusted_rand, classes_by_incoherence
 from chimera_hpc.classify.density import density_classes
 from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.classify.verdicts import RULES
+from chimera_hpc.job.class_names import is_papers_system
 from chimera_hpc.reduction.analyses.incoherence import strengths, unit_of
 from chimera_hpc.reduction.analyses.judged import most_frequent
 from chimera_hpc.reduction.analysis_input import AnalysisInput
-from chimera_hpc.reduction.names import is_papers_system
 
 Verdicts = list[str | None]
 _COMMON = {*CLASSES, STEADY, NO_WINDOW, None}
