@@ -108,6 +108,7 @@ FIGURES = {
     "sigma_l": "chimera_hpc.plot.density:sigma_l_figure",
     "agreement": "chimera_hpc.plot.agreement:agreement_figure",
     "agreement_matrix": "chimera_hpc.plot.agreement:matrix_figure",
+    "hysteresis": "chimera_hpc.plot.hysteresis:hysteresis_figure",
     "class_number": "chimera_hpc.plot.class_number:class_number_figure",
     "verdicts": "chimera_hpc.plot.agreement:verdicts_figure",
     "reconstruction": "chimera_hpc.plot.synthetic:reconstruction_figure",

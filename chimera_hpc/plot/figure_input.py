@@ -74,6 +74,8 @@ class FigureInput:
     """``decide`` and ``boundaries`` of results.json; empty for a job without [decide]."""
     beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """``curves`` of the sweeps that are drawn with this one, by their names."""
+    chains: Mapping[str, Any] = field(default_factory=dict)
+    """``chains`` and ``hysteresis`` of results.json; empty for a sweep without chains."""
     shown: Sequence[DrawnRun] = ()
     """Runs over the analysis interval."""
     whole: Sequence[DrawnRun] = ()

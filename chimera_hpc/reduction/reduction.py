@@ -22,6 +22,7 @@ from chimera_hpc.reduction.agreement_text import agreement_lines, cluster_lines
 from chimera_hpc.reduction.audit import Basis, Labeller, basis_of, kept_audit
 from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
+from chimera_hpc.reduction.chains import chain_lines, chain_results
 from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
 from chimera_hpc.reduction.decided import decided_lines, decided_results
 from chimera_hpc.reduction.quality import poor_classes, quality_warnings
@@ -133,6 +134,7 @@ class _Work:
         self.classification: Classification
         self.results: dict[str, Any] = {}
         self.curves: dict[str, Any] = {}
+        self.chains: dict[str, Any] = {}
         self.atlases: dict[str, Atlas] = {}
         self.decided: dict[str, Any] = {}
         self.table = ""
@@ -170,6 +172,10 @@ class _Work:
         if self.convention == OWN:
             self.decided = json_safe(decided_results(store, made.cuts[self.cuts[0]], self.status))
         self.results |= self.decided
+        cut = made.cuts[self.cuts[0]]
+        names = run_names(cut.labels, self.status, cut.names)
+        self.chains = json_safe(chain_results(store, names, self.scalars))
+        self.results |= self.chains
         audit, line = kept_audit(self.place, self._basis)
         self.results |= audit
         if line:
@@ -301,6 +307,7 @@ class _Work:
             cells={k: self.results["cuts"][str(k)]["cells"] for k in self.cuts},
             curves=self.curves,
             decided=self.decided,
+            chains=self.chains,
             kept=self._kept(),
             beside=curves_beside(
                 self.folder, store.sweep.reduction.beside, self.note, self.convention
@@ -328,7 +335,7 @@ class _Work:
         if "agreement" in self.curves:
             for line in agreement_lines(self.curves["agreement"]):
                 self._say(line)
-        for line in cluster_lines(self.curves):
+        for line in (*chain_lines(self.results), *cluster_lines(self.curves)):
             self._say(line)
         for line in self.results["warnings"]:
             self.note(f"warning: {line}")

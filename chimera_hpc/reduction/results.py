@@ -225,6 +225,14 @@ class _Audit(_Part):
     bootstrap: _Bootstrap
 
 
+class _Chain(_Part):
+    along: str
+    direction: Literal["forward", "backward"]
+    values: list[float]
+    classes: list[str | None]
+    order: list[float | None]
+
+
 class _Results(_Part):
     version: Literal[1] = Field(alias="schema")
     sweep: str
@@ -234,6 +242,7 @@ class _Results(_Part):
     claims: list[dict[str, Any]]
     audit: _Audit | None = None
     warnings: list[str] = []
+    chains: list[_Chain] = []
 
 
 def to_json(results: Mapping[str, Any]) -> str:

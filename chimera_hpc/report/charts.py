@@ -191,6 +191,26 @@ def robustness(entries: Mapping[str, Mapping[str, Any]]) -> figure:
     return plot
 
 
+def hysteresis(chains: Sequence[Mapping[str, Any]], along: str, order: str) -> figure:
+    """Return the order parameter along each chain, with the classes as tooltips.
+
+    `chains` as in results.json.
+    """
+    plot = _figure("hysteresis", 340, tools="box_zoom,reset,save")
+    plot.xaxis.axis_label, plot.yaxis.axis_label = along, order.replace("_", " ")
+    for chain in chains:
+        colour, marker = _BAND_LOOKS[chain["direction"] == "backward"]
+        columns = {"x": chain["values"], "order": chain["order"], "class": chain["classes"]}
+        source = ColumnDataSource({name: list(values) for name, values in columns.items()})
+        look = {"color": colour, "legend_label": chain["direction"]}
+        plot.line("x", "order", source=source, line_alpha=0.6, **look)
+        dots = plot.scatter("x", "order", source=source, marker=marker, size=6, **look)
+        tooltips = [(along, "@x"), (order, "@order{0.0000}"), ("class", "@class")]
+        plot.add_tools(HoverTool(renderers=[dots], tooltips=tooltips))
+    plot.legend.background_fill_alpha = 0.8
+    return plot
+
+
 def _figure(name: str, height: int, **options: Any) -> figure:
     plot = figure(
         name=name,

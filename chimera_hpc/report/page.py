@@ -36,6 +36,7 @@ from chimera_hpc.reduction.audit_text import (
     changed_lines,
     sample_line,
 )
+from chimera_hpc.reduction.chains import chain_lines
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.report import charts
 from chimera_hpc.report.content import Content
@@ -49,6 +50,10 @@ MOST_FAILURES = 200
 """Failed points that are listed; the command `status --failures` lists all."""
 MOST_RUNS = 20
 """Runs of the command whose provenance is listed, the latest ones."""
+
+
+_MOST_CHAINS = 60
+"""Chains that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "claims": content.results.get("claims", []),
         "audit": _audit(content),
         "agreement": _agreement(content),
+        "chains": chain_lines(content.results),
         "clusters": cluster_lines(content.results.get("curves", {})),
         "names": {name: list(group) for name, group in _groups(figures).items()},
         "script": loader.get_source(environment, "report.js")[0],
@@ -137,6 +143,9 @@ def _figures(content: Content, n_branches: int) -> dict[str, figure]:
     curves = _robustness(content)
     if curves:
         figures["robustness"] = charts.robustness(curves)
+    if cells := content.results.get("hysteresis"):
+        first, chains = cells[0], content.results["chains"][:_MOST_CHAINS]
+        figures["hysteresis"] = charts.hysteresis(chains, first["along"], first["order"])
     return figures
 
 
@@ -144,7 +153,7 @@ def _groups(figures: Mapping[str, figure]) -> dict[str, list[str]]:
     return {
         "planes": [name for name in figures if name.startswith("plane")],
         "profiles": [name for name in figures if name in charts.PROFILES],
-        "others": [name for name in figures if name in (charts.TREE, "robustness")],
+        "others": [name for name in figures if name in (charts.TREE, "robustness", "hysteresis")],
     }
 
 
