@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import nearest, short
 from chimera_hpc.job.chains import chain_length
 from chimera_hpc.job.initial_file import initial_file
 from chimera_hpc.job.models import build
 from chimera_hpc.job.networks import distinct, groups_of
+from chimera_hpc.job.registry import measures
 from chimera_hpc.models.parameters import Column
 from chimera_hpc.network.sweep_network import RING
 
@@ -51,6 +53,7 @@ def check_states(sweep: Sweep) -> None:
     sizes = state_sizes(sweep, points.columns)
     if sweep.continue_ is not None:
         _check_chains(sweep.continue_.along, sizes.reshape(-1, chain_length(sweep), 2))
+        _check_order(sweep)
     if given is not None and digest is not None:
         states, seeds = initial_file(given, digest), points.columns["seed"]
         for i in sorted({*np.unique(sizes, axis=0, return_index=True)[1], int(seeds.argmax())}):
@@ -58,6 +61,17 @@ def check_states(sweep: Sweep) -> None:
                 states.check((int(sizes[i, 0]), int(sizes[i, 1])), int(seeds[i]))
             except BadInput as error:
                 raise BadInput(f"integrator.initial: {given}: {error}") from None
+
+
+def _check_order(sweep: Sweep) -> None:
+    """Raise BadInput unless the panel has the order parameter; its default may be missing."""
+    order, panel = sweep.reduction.order, measures(sweep.measures.panel)
+    known = [label for measure in panel for label in measure.labels(sweep.features)]
+    if order not in known and "order" in sweep.reduction.model_fields_set:
+        raise BadInput(
+            f"reduction.order: {short(order)} is no scalar of this sweep{nearest(order, known)}; "
+            "[measures] panel chooses them"
+        )
 
 
 def _check_chains(along: str, sizes: NDArray[np.int64]) -> None:

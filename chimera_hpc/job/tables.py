@@ -284,6 +284,10 @@ class Reduction(Table):
     deltas: Annotated[tuple[Annotated[float, Field(ge=0)], ...], BeforeValidator(as_tuple)] = Field(
         (), description="Thresholds of the strength of incoherence."
     )
+    order: Line = Field(
+        "order_parameter",
+        description="Scalar that serves as order parameter of chains, with [continue].",
+    )
     delta_unit: Literal["range", "absolute"] = Field(
         "range", description="Unit of deltas: the range of u of each run, or the unit of u."
     )

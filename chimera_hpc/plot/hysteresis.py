@@ -61,7 +61,10 @@ def _draw_order(axes: Axes, cell: Mapping[str, Any], chains: Sequence[Mapping[st
         axes.fill_between(
             x, masked.min(axis=0), masked.max(axis=0), color=look["color"], alpha=0.15, linewidth=0
         )
-        middle = np.ma.median(masked, axis=0)
+        middle = [
+            float(np.nanmedian(column)) if np.isfinite(column).any() else np.nan
+            for column in order.T
+        ]
         axes.plot(x, middle, linewidth=0.9, markersize=3.0, **look)
         if cell[way]["step"] is not None:
             axes.axvspan(*cell[way]["step"]["interval"], color=look["color"], alpha=0.08)

@@ -13,8 +13,6 @@ from chimera_hpc.job.chains import FORWARD
 from chimera_hpc.reduction.cells import number
 from chimera_hpc.store.store import Store
 
-ORDERS = ("order_parameter", "R")
-"""Scalars that serve as order parameter, the first that a sweep has; else the first of all."""
 _WAYS = ("forward", "backward")
 
 
@@ -27,7 +25,9 @@ def chain_results(
     """
     if store.sweep.continue_ is None:
         return {}
-    order = next((name for name in ORDERS if name in scalars), next(iter(scalars)))
+    order = store.sweep.reduction.order
+    if order not in scalars:
+        order = next(iter(scalars))
     chains = [
         entry
         for block in range(store.n_blocks)

@@ -12,6 +12,9 @@ from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
+from chimera_hpc.plot.hysteresis import hysteresis
+from chimera_hpc.reduction.chains import chain_lines
+from chimera_hpc.reduction.results import read_results
 from chimera_hpc.run.block import run_block
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
@@ -137,6 +140,28 @@ def test_recomputed_points_are_those_of_the_store(serial, capsys):
     assert "20 of 20 points recomputed, 0 different" in capsys.readouterr().out
 
 
+def test_results_hold_chains_and_their_thresholds(serial, tmp_path):
+    results = read_results(serial / "results.json")
+    store = open_store(serial)
+    chains = results["chains"]
+    assert [(chain["P"], chain["direction"]) for chain in chains] == [
+        (2, "forward"),
+        (2, "backward"),
+        (3, "forward"),
+        (3, "backward"),
+    ]
+    assert chains[1]["values"] == sorted(B, reverse=True)
+    order = store.scalars()["order_parameter"]
+    assert chains[1]["order"] == order[5:10].tolist()
+    assert all(len(chain["classes"]) == 5 for chain in chains)
+    (first, _) = results["hysteresis"]
+    assert (first["P"], first["along"], first["order"]) == (2, "b", "order_parameter")
+    assert first["backward"]["step"]["interval"] == chains[1]["step"]["interval"]
+    assert chain_lines(results)[0].startswith("P = 2: b forward: ")
+    figure = hysteresis(chains, results["hysteresis"])
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["P = 2", "P = 3"]
+
+
 def test_an_extension_adds_whole_chains(serial, tmp_path, capsys):
     job, out = write_job(tmp_path, grid__P=[3]), tmp_path / "out"
     assert run(job, out, "--cluster", "serial") == 0
@@ -239,6 +264,7 @@ def test_files_that_do_not_fit_are_one_line(arrays, line, tmp_path, capsys):
         ({"continue__along": "P", "grid__Q": "0:P", "fixed__Q": None}, "the axis Q depends on it"),
         ({"continue__along": "Q", "grid__Q": "P", "fixed__Q": None}, "depends on another axis"),
         ({"run__block": 4}, "run.block: 4, but with [continue] a chain is a block"),
+        ({"reduction__order": "R"}, "reduction.order: 'R' is no scalar of this sweep"),
         ({"reduction__replay": ["P=2"]}, "reduction.replay: with [continue]"),
     ],
 )
