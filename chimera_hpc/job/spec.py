@@ -316,6 +316,8 @@ class Sweep(Table):
             check_added(model, axes, self.fixed, self.added)
         if self.decide is not None:
             self.decide.check_axes(axes)
+            if self.continue_ is not None:
+                raise BadInput("decide: not with [continue], whose seeds are whole chains")
         if self.continue_ is not None and (self.decide or self.added) is not None:
             raise BadInput("decide: not with [continue], whose points need all of their chain")
         single = {name: Values((value,)) for name, value in self.fixed.items()}

@@ -265,6 +265,7 @@ def test_files_that_do_not_fit_are_one_line(arrays, line, tmp_path, capsys):
         ({"continue__along": "Q", "grid__Q": "P", "fixed__Q": None}, "depends on another axis"),
         ({"run__block": 4}, "run.block: 4, but with [continue] a chain is a block"),
         ({"reduction__order": "R"}, "reduction.order: 'R' is no scalar of this sweep"),
+        ({"decide__most": 10, "grid__seeds": None}, "decide: not with [continue]"),
         ({"reduction__replay": ["P=2"]}, "reduction.replay: with [continue]"),
     ],
 )
