@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -87,9 +88,19 @@ def styled(make: Callable[Arguments, Made]) -> Callable[Arguments, Made]:
     return make_styled
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        drawn = BytesIO()
+        with mpl.rc_context(SETTINGS):
+            self.savefig(drawn, dpi=100)
+        return drawn.getvalue()
+
+
 def new_figure(width: float = PAGE, height: float = 2.4) -> Figure:
     """Return an empty figure of this size in inches, with the layout that clips nothing."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return ShownFigure(figsize=(width, height), layout="constrained")
 
 
 def new_panels(

@@ -34,7 +34,11 @@ def test_a_notebook_was_executed_from_top_to_bottom_without_an_error(file):
     cells = code_cells(file)
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     outputs = [output for cell in cells for output in cell["outputs"]]
-    assert {output["output_type"] for output in outputs} <= {"stream", "display_data", "execute_result"}
+    assert {output["output_type"] for output in outputs} <= {
+        "stream",
+        "display_data",
+        "execute_result",
+    }
     assert file.stat().st_size < 500_000
 
 

@@ -53,7 +53,8 @@ def test_runs_without_a_dataset() -> None:
     for runs, count in (((t, u[0]), 1), ([(t, one) for one in u[:2]], 2), (u[:3], 3)):
         panels = [axes for axes in plot.space_time(runs, step=0.05).axes if axes.get_xlabel()]
         assert len(panels) == count
-    made = plot.profiles((t, u[0]), titles=["one"])
+    made: Any = plot.profiles((t, u[0]), titles=["one"])
+    assert made._repr_png_().startswith(b"\x89PNG")  # as a notebook shows it
     assert made.axes[0].get_title() == "one"
 
 

@@ -548,6 +548,23 @@ def test_classes_of_another_system_have_letters_everywhere(tmp_path):
     assert Content.read(tmp_path).classification.base.names == ("A", "B", "C")
 
 
+def test_measures_are_compared_by_partition_where_classes_have_letters(tmp_path):
+    filled(
+        tmp_path,
+        'reduction.figures=["agreement_matrix", "verdicts"]',
+        "features.refine=sine-fit",
+        'reduction.analyses=["agreement"]',
+        "reduction.deltas=[0.0]",
+    )
+    summary, _ = told(tmp_path)
+    made = results_in(tmp_path)["curves"]["agreement"]
+    assert made["modal"]["triplets"] == ["A", "B", "C"]
+    pairs = {(pair["rows"], pair["columns"]): pair for pair in made["pairs"]}
+    assert pairs["triplets", "SI"]["kappa"] is None
+    assert pairs["triplets", "SI"]["adjusted_rand"] is not None
+    assert len(summary.figures) == 4
+
+
 def test_runs_of_one_state_are_said_to_be_one(tmp_path):
     store = make_store(tmp_path, FAST, "grid.seeds=24")
     store.start_run({})
