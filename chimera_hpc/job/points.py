@@ -158,6 +158,37 @@ def dependency_order(axes: Mapping[str, Axis]) -> list[str]:
     return order
 
 
+class Product:
+    """The rows of a product of axes, any stretch of them without the others.
+
+    axes: in order of declaration; the first varies slowest, and none is empty.
+
+    Only the axes up to the last one that depends on another are expanded and held.
+    """
+
+    def __init__(self, axes: Mapping[str, Axis]) -> None:
+        names = list(axes)
+        linked = {other for name in names for other in references(axes[name])}
+        linked |= {name for name in names if references(axes[name])}
+        cut = max(map(names.index, linked), default=-1) + 1
+        self._names = names
+        self._head = expand({name: axes[name] for name in names[:cut]})
+        self._tail = {name: axis for name in names[cut:] if isinstance(axis := axes[name], Values)}
+        lengths = [len(axis.values) for axis in self._tail.values()]
+        self._n_head = len(self._head[names[0]]) if cut else 1
+        self.n_rows = self._n_head * math.prod(lengths)
+
+    def columns(self, first: int, stop: int) -> dict[str, Column]:
+        """Return rows `first` up to `stop` as columns."""
+        # In place: of ten million rows, each array takes 80 MB.
+        rows, tail = np.arange(first, stop), {}
+        for name, axis in reversed(self._tail.items()):
+            place = np.empty_like(rows)
+            np.divmod(rows, len(axis.values), out=(rows, place))
+            tail[name] = _entries(axis, place)
+        return {n: tail[n] if n in tail else self._head[n][rows] for n in self._names}
+
+
 def expand(
     axes: Mapping[str, Axis],
     check: Callable[[str, dict[str, Column]], None] = lambda name, columns: None,
@@ -217,6 +248,15 @@ def as_array(axis: Values) -> Column:
     if isinstance(values, range):
         return np.arange(values.start, values.stop, values.step, dtype=np.int64)
     return np.array(values, dtype=np.int64 if isinstance(values[0], int) else np.float64)
+
+
+def _entries(axis: Values, place: NDArray[np.int64]) -> Column:
+    """Return the values of an independent axis at some places, which may be overwritten."""
+    if isinstance(axis.values, range):
+        place *= axis.values.step
+        place += axis.values.start
+        return place
+    return as_array(axis)[place]
 
 
 def _rank(axis: Axis, column: Column) -> NDArray[Any]:

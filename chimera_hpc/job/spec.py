@@ -46,7 +46,7 @@ from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.networks import check_sizes, observed_sizes
 from chimera_hpc.job.parameters import DELTA, DIRECTION, SEED, fixed_schema, grid_schema
-from chimera_hpc.job.points import DTYPES, Points, appended, expand
+from chimera_hpc.job.points import DTYPES, Points, Product, appended, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
 from chimera_hpc.job.selection import check_names, check_network_choices
 from chimera_hpc.job.table import Line, Table
@@ -241,6 +241,19 @@ class Sweep(Table):
             return points
         return appended(points, self._points_of(expand_added(self.added, points.axes[:-1])))
 
+    @property
+    def is_product(self) -> bool:
+        """Whether the points are the product of the axes, in its order."""
+        return self.added is None and self.continue_ is None
+
+    @cached_property
+    def _product(self) -> Product:
+        return Product(self.axes)
+
+    def stretch(self, first: int, stop: int) -> Points:
+        """Return ``points()[first:stop]`` of a product without the other points."""
+        return self._points_of(self._product.columns(first, stop))
+
     def _points_of(self, columns: dict[str, Column]) -> Points:
         """Return points by the columns of the axes, with what is fixed."""
         axes, chains = self.axes, self.continue_
@@ -255,7 +268,7 @@ class Sweep(Table):
             {
                 name: columns[name].astype(DTYPES[kind], copy=False)
                 if name in columns
-                else np.full(n_points, single[name], DTYPES[kind])
+                else np.broadcast_to(DTYPES[kind](single[name]), n_points)
                 for name, kind in kinds.items()
             },
             tuple(axes) if chains is None else axis_names(axes, chains),

@@ -286,7 +286,7 @@ class _Block:
         return self._none(points, status)
 
     def _points(self, rows: Rows) -> Points:
-        return self.store.points[self.store.block(self.block)[0] + rows]
+        return self.store.block_points(self.block)[rows]
 
     def _deaths(self, claim: Claim) -> list[LostAttempt]:
         """Return the earlier attempts that may have died of the work itself.

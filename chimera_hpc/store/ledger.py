@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
 from pathlib import Path
@@ -35,6 +35,8 @@ METADATA = "zarr.json"
 METADATA_COPY = "zarr.json.copy"
 """The same, with the crc32c of the metadata that it replaced and one of all that behind it."""
 _CHECKSUM_BYTES = 4
+_STRETCH = 256
+"""Blocks whose ledger is in memory twice while it is read."""
 _KNOWN = np.isin(np.arange(256), [int(status) for status in Status])
 """Whether each byte is the code of a status."""
 
@@ -132,17 +134,24 @@ def scan_ledger(store: Path, metadata: Mapping[str, Any] | None = None) -> Ledge
     """Read every ledger chunk and check its length and crc32c; a damaged one is no error."""
     n_points, block_size = ledger_shape(metadata or read_metadata(store))
     n_blocks = -(-n_points // block_size)
-    table = np.full((n_blocks, block_size, len(FIELDS)), Status.NEVER, dtype="<i8")
+    # Zeros that nothing is written to take no memory.
+    columns = {name: np.zeros(n_points, dtype=np.int64) for name in FIELDS}
+    columns["status"][:] = Status.NEVER
     written = np.zeros(n_blocks, dtype=np.bool_)
-    damaged = []
-    for block, path in _chunks(Path(store) / "ledger", n_blocks):
-        rows = _read_chunk(path, block_size)
-        if rows is None:
-            damaged.append(block)
-        else:
-            table[block] = rows
-            written[block] = True
-    columns = table_columns(table.reshape(-1, len(FIELDS))[:n_points])
+    damaged: list[int] = []
+    for first, paths in _stretches(_chunks(Path(store) / "ledger", n_blocks)):
+        table = np.full((_STRETCH, block_size, len(FIELDS)), Status.NEVER, dtype="<i8")
+        for block, path in paths:
+            rows = _read_chunk(path, block_size)
+            if rows is None:
+                damaged.append(block)
+            else:
+                table[block - first] = rows
+                written[block] = True
+        here = slice(first * block_size, min((first + _STRETCH) * block_size, n_points))
+        flat = table.reshape(-1, len(FIELDS))[: here.stop - here.start]
+        for name, column in table_columns(flat).items():
+            columns[name][here] = column
     return LedgerScan(columns, written, tuple(sorted(damaged)))
 
 
@@ -253,6 +262,14 @@ def _chunks(folder: Path, n_blocks: int) -> list[tuple[int, str]]:
     parts = [(name, name.split(SEPARATOR)) for name in names]
     numbers = [(p[1], n) for n, p in parts if len(p) == 3 and p[0] == "c" and p[1].isdecimal()]
     return [(int(i), os.path.join(folder, n)) for i, n in numbers if int(i) < n_blocks]
+
+
+def _stretches(chunks: list[tuple[int, str]]) -> Iterator[tuple[int, list[tuple[int, str]]]]:
+    """Return the first block of each `_STRETCH` blocks of which there are chunks, and these."""
+    found: dict[int, list[tuple[int, str]]] = {}
+    for block, path in chunks:
+        found.setdefault(block // _STRETCH * _STRETCH, []).append((block, path))
+    yield from found.items()
 
 
 def _read_chunk(path: str, block_size: int) -> NDArray[np.int64] | None:

@@ -120,6 +120,13 @@ class Store:
             raise BadInput(f"{self.path}: the attributes are damaged: {text}")
         return points
 
+    def block_points(self, i: int) -> Points:
+        """Return the points of block i; a process that needs no others does not hold them."""
+        first, stop = self.block(i)
+        if len(self.sweeps) > 1 or not self.sweep.is_product:
+            return self.points[first:stop]
+        return self.sweep.stretch(first, stop)
+
     def check_spec(self, sweep: Sweep) -> None:
         """Raise BadInput, naming the keys that differ, unless the store was made for this sweep.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import naive
 import numpy as np
@@ -78,6 +79,32 @@ def test_index_and_point_belong_together(case, data):
 
 
 BIG = [2**31 + 5, 2**53, 2**53 + 1, 2**62 + 1, 2**63 - 1]
+
+
+@settings(max_examples=60)
+@given(grids(), st.data())
+def test_a_stretch_of_points_is_that_of_the_whole_list(case, data):
+    made = sweep(case[0])
+    whole = made.points()
+    first = data.draw(st.integers(0, len(whole) - 1))
+    stop = data.draw(st.integers(first + 1, len(whole)))
+    part, wanted = made.stretch(first, stop), whole[first:stop]
+    assert part.axes == wanted.axes
+    assert [*part.columns] == [*wanted.columns]
+    for name, column in part.columns.items():
+        assert column.dtype == wanted.columns[name].dtype
+        np.testing.assert_array_equal(column, wanted.columns[name])
+
+
+def test_a_stretch_of_ten_million_points_takes_little_memory():
+    made = sweep({"P": "10:19", "Q": "0:9", "seeds": 100_000})
+    tracemalloc.start()
+    part = made.stretch(7_000_000, 7_000_016)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 200_000
+    assert part.row(0) == made.stretch(7_000_000, 7_000_001).row(0)
+    assert (part.row(1)["P"], part.row(1)["Q"], part.row(1)["seed"]) == (17, 0, 1)
 
 
 @given(st.lists(st.integers(0, 2**63 - 1), min_size=2, max_size=6, unique=True))
