@@ -159,7 +159,7 @@ def test_time_in_which_the_process_was_stopped_does_not_count(tmp_path: Path) ->
 import time
 from chimera_hpc.base.foreign import foreign_code
 from chimera_hpc.run import watchdog
-watchdog.limit_of = lambda sweep: 1.5
+watchdog.limit_of = lambda sweep: 3.0
 watchdog.watchdog.on_hang = lambda text: print("hangs", flush=True)
 watchdog.watchdog.watch(None)
 with foreign_code():
@@ -171,8 +171,9 @@ with foreign_code():
         assert process.stdout is not None
         assert process.stdout.readline() == "in\n"
         os.kill(process.pid, signal.SIGSTOP)
-        time.sleep(3)
+        time.sleep(5)
         os.kill(process.pid, signal.SIGCONT)
+        time.sleep(0.3)  # It looks once more.
         said, _ = process.communicate("\n")
     assert said == ""
 
