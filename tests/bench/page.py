@@ -148,65 +148,70 @@ _HEAD = """# Measured performance
 
     scripts/bench --write
 
-measures all of this in one run, with the peers installed beside (`.venv-bench`). Medians of
-interleaved turns, of at least a second for each contender where peers are in the row. Whole
-commands and bare blocks run by turns of a second, bare blocks and dgemm by turns of a tenth, one
-standing still while another runs, each charged with its own turns. A whole command is compared
-several times: medians, and each comparison in the last column. One core unless workers are named.
+measures everything on this page in one run. It installs the peers in `.venv-bench`.
+
+* Contenders run in turns, and medians are compared. Where a peer is in the row, a turn takes at
+  least one second.
+* A whole command is compared with bare blocks, which are the same points without executor and
+  store, in turns of one second. Bare blocks are compared with dgemm in turns of 0.1 s. One process
+  is stopped while the other runs, and only its own turns count for each.
+* A whole command is compared several times. The value is the median; the last column lists all.
+* One core is used unless the row names workers.
+
 Machine: {machine}; load average at the
 start {load:.1f}."""
 
 _WHY = """\
-What limits it:
+What limits the speed:
 
-* Eight trajectories of 50 nodes are larger than the first cache; those of 100 to some 800 nodes are
-  in the second one, whose rate bounds the sums over stages. The error norm waits for its divisions.
-  That, and the work on two variables, is what limits the networked model. From some 800 nodes on
-  one trajectory at a time goes along the ring. When its state is larger than the second cache, here
-  from {nodes:,} nodes on, the part of it that still stays there shrinks as the ring grows; the rest
-  comes from the third cache or from memory.
-* Starting Python, the cluster and its workers, planning and the reduction take a few seconds
-  whatever the number of points, and at the end one worker waits for the other's last block.
-* A virtual machine may change its speed by half within seconds: medians of five turns change with
-  it, and such rows fall to either side of a target that is near from one call to the next.
-* Its cores may be threads of cores that other machines use too. Then two processes do not do twice
-  the work of one, whatever they do: what dgemm gains from the second core is measured at the same
-  moments as what the blocks gain, and 2 workers over 1 is shown as it is and as a part of that."""
+* Caches. The state of eight trajectories of 50 nodes is larger than the first-level cache. With 100
+  to about 800 nodes it fits into the second level, whose bandwidth limits the sums over stages. The
+  divisions in the error norm add latency. The networked model has the same limits. Above about
+  800 nodes the trajectories are computed one at a time. From {nodes:,} nodes on (on this machine)
+  one state is larger than the second-level cache, and the rest comes from the third level or from
+  memory.
+* Start and end. Python, the cluster, its workers, planning and the reduction take a few seconds for
+  any number of points. At the end, one worker waits for the last block of the other.
+* Virtual machines. Their speed may change by half within seconds, and medians of five turns change
+  with it. A row whose value is near its target may meet it in one run and miss it in the next.
+* Shared cores. A virtual core may be one of two hardware threads of a core, and another machine may
+  use the second. Two processes then do less than twice the work of one. dgemm is therefore run in
+  one and in two processes at the same moments as the blocks. The row "2 workers over 1" is given as
+  measured, and relative to dgemm."""
 
 _ERRORS = """\
-*Error* is the largest difference of u from a DOP853 solution at rtol 1e-13, up to t = 20
-(later, chaos has made everything of it). Peers run at rtol 1e-6; ours runs at the loosest
-tolerance whose error is not larger than theirs, and what comes out at equal tolerance stands
-beside. Full form: nodes and links as the paper prints them, which is what a user of the peers
-would write; reduced form: the exact reduction that this package uses."""
+*Error* is the largest difference of u from a DOP853 solution at rtol 1e-13, up to t = 20; at later
+times chaos amplifies any error. Peers run at rtol 1e-6. Ours runs at the loosest tolerance whose
+error is not larger than theirs; the ratio at equal tolerance is given too. Full form: nodes and
+links as the paper prints them, which is what a user of the peers would write. Reduced form: the
+exact reduction that this package uses."""
 
 _PICTURE = """![Work against precision](images/performance.png)"""
 
 _PRICED = (1e-2, 1e-4, 1e-6)
 _PRECISION = """\
-Of the methods of this package Tsit5 is the default, as in the paper; a job or a call may ask for
-another one. Time of a trajectory of 20 units, u every 0.01, for some errors, read off the curves
-of the picture:"""
+Tsit5 is the default method, as in the paper; a job or a call may choose another one. Time per
+trajectory of 20 time units, with u every 0.01, at some errors, interpolated between the points of
+the picture:"""
 
 _SCALING = """![Seconds against workers, points, nodes and P](images/scaling.png)"""
 
 _REDUCTION = """## Reduction at scale
 
-Ward's tree is grown in linear memory beyond 4,000 oscillating runs; beyond 100,000 (10,000 with
-average or complete linkage) it grows over a sample without chance that covers every region of
-the triplets, and the others take the class of their nearest sampled run. Triplets of the plane
-sweep, resampled:"""
+Above 4,000 oscillating runs, Ward's tree is computed in linear memory. Above 100,000 (10,000 with
+average or complete linkage) it is computed from a deterministic sample that covers every region of
+the triplets; each of the other runs takes the class of the nearest run of the sample. Times for the
+triplets of the plane sweep, resampled:"""
 
 _PROJECTION = """## 10,000 cores and 10 million points
 
-No such machine was at hand: this is a simulation of the run, fed with what was measured here:
-{point:.1f} ms per point, {worker:.1f} ms per block on the worker (claim, write, flush),
-{scheduler:.2f} ms per block of the scheduler's processor time, {ledger:.0f} ns per point to read
+No such machine was available. These figures come from a simulation of the run with costs measured
+here: {point:.1f} ms per point, {worker:.1f} ms per block on the worker (claim, write, flush),
+{scheduler:.2f} ms of processor time per block in the scheduler, {ledger:.0f} ns per point to read
 the ledger."""
 
 _AT_SCALE = """\
-With the scheduler, its one thread is the first bottleneck: it hands out a block in the time
-above, so that about (seconds a block) / (that time) cores can be fed. Job arrays (`slurm --mode
-array`) know no scheduler; what is lost there is the last block of each core and reading the
-ledger once. What neither shows is the file system: each block is four files and a claim, and a
-metadata server has its own limits."""
+With a scheduler, its single thread is the first bottleneck: it can feed about (seconds per block) /
+(scheduler seconds per block) cores. Job arrays (`slurm --mode array`) need no scheduler. They lose
+the time of the last block of each core and of reading the ledger once. Neither simulation includes
+the file system: each block is five files and a claim, and a metadata server has its own limits."""
