@@ -37,6 +37,7 @@ from chimera_hpc.reduction.audit_text import (
     sample_line,
 )
 from chimera_hpc.reduction.chains import chain_lines
+from chimera_hpc.reduction.decided import decided_lines
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.report import charts
 from chimera_hpc.report.content import Content
@@ -113,6 +114,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "spec": json.dumps(content.store.sweep.to_dict(), indent=1),
         "claims": content.results.get("claims", []),
         "audit": _audit(content),
+        "decided": list(decided_lines(content.results, content.axes)),
         "agreement": _agreement(content),
         "chains": chain_lines(content.results),
         "clusters": cluster_lines(content.results.get("curves", {})),

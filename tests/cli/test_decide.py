@@ -14,6 +14,8 @@ from chimera_hpc.classify.classification import Classification, Cut
 from chimera_hpc.job.points import point_keys
 from chimera_hpc.plot.boundaries import boundaries_figure
 from chimera_hpc.plot.figure_input import FigureInput
+from chimera_hpc.report.content import Content
+from chimera_hpc.report.page import page as report_of
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
@@ -123,6 +125,13 @@ def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
     assert code == 0
     assert same(tmp_path / "sweep", decided / "sweep")
     assert results(tmp_path / "sweep")["decide"] == results(decided / "sweep")["decide"]
+
+
+def test_report_tells_decided_cells(decided):
+    page = report_of(Content.read(decided / "sweep"), most_pictures=0, replay=False)
+    found = results(decided / "sweep")
+    assert "Decided cells and boundaries" in page
+    assert f"by {found['decide']['runs']} runs in {found['decide']['rounds']} rounds" in page
 
 
 def test_figure_has_a_bar_per_boundary_and_open_markers(decided):
