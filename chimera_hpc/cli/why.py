@@ -95,5 +95,6 @@ _HINTS = {
     Status.OUT_OF_MEMORY: "`retry --status out_of_memory --mem SIZE` gives it more memory",
     Status.WORKER_LOST: "`retry --status worker_lost` tries it again; look into the system's log",
     Status.NON_FINITE: "`retry --status non_finite --set run.tighten=0.01` asks for more accuracy",
+    Status.NOT_STARTED: "`retry` does it together with the point of its chain that failed",
     Status.STEP_TOO_SMALL: "integrator.atol may be too small for this point",
 }
