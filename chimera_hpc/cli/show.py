@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
@@ -20,6 +22,7 @@ from chimera_hpc.cli.arguments import (
     value,
 )
 from chimera_hpc.cli.ending import name_of
+from chimera_hpc.network.layout import chosen_layout
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,6 +41,8 @@ show its seeds side by side, and the portrait and spectrum of the one that stand
 most frequent class, nearest to the median of its variations. Nodes and windows count from 0, here
 and in figures.
 """
+Array = NDArray[np.float64]
+
 _SIDE_BY_SIDE = 6
 """Most seeds of a cell that are drawn."""
 _FRAMES_A_PERIOD = 25
@@ -52,6 +57,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         out=value("DIR", folder_name, "where figures go (default: figures/show)"),
         animate=value("FILE", Path, "write the ring's motion, .gif or .mp4"),
         periods=value("N", float, "periods of it (default: 5)", default=5.0),
+        layout=value("HOW", str, "network: spring, circular, or a file of x, y", default="auto"),
     )
 
 
@@ -67,6 +73,7 @@ def execute(args: Namespace) -> int:
     if not 0 <= node < store.sweep.n_observed:
         raise BadInput(f"--node {node}: allowed is 0 to {store.sweep.n_observed - 1}")
     _one_cell(store, chosen)
+    layout = chosen_layout(args.layout)
     from chimera_hpc.plot.animation import check_film
     from chimera_hpc.reduction.replay import replay, representative
 
@@ -84,7 +91,9 @@ def execute(args: Namespace) -> int:
         print(f"portrait and spectrum: {name_of(store, first)}")
     folder = args.out or path.parent / "figures" / "show"
     stem = _stem(store, first, len(runs) == 1)
-    for made in _draw(store, runs, focus, node, args.window, folder, stem):
+    figures = _figures(store, runs, focus, node, args.window)
+    figures |= _network_figure(store, focus, layout)
+    for made in _save(figures, folder, stem):
         print(f"written: {made}")
     if args.animate is not None:
         _animate(store, focus, args.animate, args.periods)
@@ -145,30 +154,34 @@ def _stem(store: Store, point: int, with_seed: bool) -> str:
     return re.sub(r"[^\w.+-]", "", "_".join(words).replace("=", "")) or "cell"
 
 
-def _draw(
-    store: Store, runs: list[Replay], focus: Replay, node: int, window: int, folder: Path, stem: str
-) -> list[Path]:
-    """Draw all that there is to draw; returns the PNG files, each with a PDF next to it."""
+def _figures(
+    store: Store, runs: list[Replay], focus: Replay, node: int, window: int
+) -> dict[str, Figure]:
+    """Draw the signals of runs; portrait and spectrum are those of the run in focus."""
+    from chimera_hpc.plot import style
     from chimera_hpc.plot.indicators import fourier_indicators, profiles_of, variations_text
+    from chimera_hpc.plot.ordered import in_order
     from chimera_hpc.plot.portrait import ring_portrait
     from chimera_hpc.plot.spacetime import space_time
     from chimera_hpc.plot.spectrum import spectrum
-    from chimera_hpc.plot.style import save
     from chimera_hpc.reduction.replay import has_nullcline, window_spectrum
+    from chimera_hpc.reduction.runs import drawn_network
 
     figures: dict[str, Figure] = {}
+    signals = store.sweep.signals
+    network = drawn_network(store.sweep, store.points.row(focus.point), print)
     # Pictures of another node or window than the default are files of their own.
     at_window = f"-window{window}" if window else ""
     at_node = "" if node == store.sweep.features.reference_node else f"-node{node}"
     seen = [run for run in runs if np.isfinite(run.u).any()]
     if seen:
-        panels = [(run.t, run.u.T) for run in seen]
-        figures["space_time"] = space_time(panels, [run.title for run in seen])
+        panels = [(run.t, in_order(run.u.T, network, signals)) for run in seen]
+        figures["space_time"] = space_time(panels, [run.title for run in seen], signals=signals)
     measured = [run for run in runs if run.n_windows]
     if measured:
         titles = [f"{run.title}\n{variations_text(run.triplet)}" for run in measured]
         figures["profiles"] = fourier_indicators(
-            [profiles_of(run.features) for run in measured], titles
+            [profiles_of(run.features) for run in measured], titles, signals=signals
         )
     if np.isfinite(focus.u).all():
         figures[f"portrait{at_node}"] = ring_portrait(
@@ -176,12 +189,34 @@ def _draw(
             title=focus.title,
             nullcline=has_nullcline(store.sweep),
             period=focus.period,
+            signals=signals,
         )
     if focus.n_windows:
         settings = store.sweep.features
         data, text = window_spectrum(focus.t, focus.u, settings, node, window)
-        print(text)
-        figures[f"spectrum{at_node}{at_window}"] = spectrum(data, f"node {node}, window {window}")
+        word = style.SIGNALS[signals]
+        print(text.replace("node", word, 1))
+        figures[f"spectrum{at_node}{at_window}"] = spectrum(data, f"{word} {node}, window {window}")
+    return figures
+
+
+def _network_figure(store: Store, run: Replay, layout: str | Array) -> dict[str, Figure]:
+    """Draw the network with a run on it, where the job has a table [network]."""
+    from chimera_hpc.plot.network_state import NetworkState, network_states
+    from chimera_hpc.reduction.runs import drawn_network
+
+    network = drawn_network(store.sweep, store.points.row(run.point), lambda line: None)
+    if network is None:
+        return {}
+    features = run.features if run.n_windows else None
+    state = NetworkState(network, run.title, store.sweep.signals, run.class_name or "", features)
+    return {"network": network_states([state], layout)}
+
+
+def _save(figures: Mapping[str, Figure], folder: Path, stem: str) -> list[Path]:
+    """Write figures; returns the PNG files, each with a PDF next to it."""
+    from chimera_hpc.plot.style import save
+
     with errors_in_one_line(folder):
         folder.mkdir(parents=True, exist_ok=True)
         return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]

@@ -98,6 +98,7 @@ FIGURES = {
     "space_time": "chimera_hpc.plot.spacetime:space_time_figure",
     "indicators": "chimera_hpc.plot.indicators:indicators_figure",
     "whole_run": "chimera_hpc.plot.spacetime:whole_run_figure",
+    "network_state": "chimera_hpc.plot.network_state:network_state_figure",
     "networks": "chimera_hpc.plot.network:networks_figure",
     "stability": "chimera_hpc.plot.stability:stability_figure",
     "basin": "chimera_hpc.plot.basin:basin_figure",

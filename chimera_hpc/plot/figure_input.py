@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.classify.classification import Classification
+from chimera_hpc.network.network import Network
 from chimera_hpc.plot.raster import NodeSeries
 from chimera_hpc.plot.style import drawn
 
@@ -48,6 +49,10 @@ class DrawnRun:
     """(8, N) in the order of `measures.fourier.FEATURES`; None where the run has none."""
     triplet: Array | None = None
     """(3,) V_theta, V_a, V_Omega; None where the run has none."""
+    network: Network | None = None
+    """The network of a job with a table [network], where it can be made."""
+    signals: str = "nodes"
+    """Where u lives: "nodes", "links" or "triangles"."""
 
     @property
     def title(self) -> str:

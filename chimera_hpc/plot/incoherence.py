@@ -30,10 +30,10 @@ def incoherence_figure(data: FigureInput) -> Figure | None:
         )
         for made in entry[entry["unit"]]["by_delta"]
     ]
-    dynamics = None
+    dynamics, signals = None, "nodes"
     if data.shown:
-        dynamics = close_up(data.shown[-1].t, data.shown[-1].u)
-    return incoherence(panels, label=label, dynamics=dynamics)
+        dynamics, signals = close_up(data.shown[-1].t, data.shown[-1].u), data.shown[-1].signals
+    return incoherence(panels, label=label, dynamics=dynamics, signals=signals)
 
 
 def sensitivity_figure(data: FigureInput) -> Figure | None:
@@ -58,7 +58,11 @@ class Strengths:
 
 @style.styled
 def incoherence(
-    panels: Sequence[Strengths], *, label: str = "$P$", dynamics: Raster | None = None
+    panels: Sequence[Strengths],
+    *,
+    label: str = "$P$",
+    dynamics: Raster | None = None,
+    signals: str = "nodes",
 ) -> Figure:
     """Draw SI as squares: red at 0, blue between, black at 1; and, if given, one run."""
     count = len(panels) + (dynamics is not None)
@@ -69,7 +73,7 @@ def incoherence(
     if dynamics is not None:
         image = draw_raster(axes[-1], dynamics, float(np.nanmax(np.abs(dynamics.values))))
         axes[-1].set_xlabel("time $t$")
-        axes[-1].set_ylabel("node $i$")
+        axes[-1].set_ylabel(style.signal_label(signals))
         figure.colorbar(image, ax=axes[-1], label="$u_i(t)$")
     style.letter(axes)
     handles, names = axes[0].get_legend_handles_labels()

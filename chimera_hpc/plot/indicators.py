@@ -23,7 +23,8 @@ def indicators_figure(data: FigureInput) -> Figure | None:
     if not runs:
         return None
     titles = [f"{run.title}{_variations(run)}" for run, _ in runs]
-    return fourier_indicators([profiles_of(features) for _, features in runs], titles)
+    profiles = [profiles_of(features) for _, features in runs]
+    return fourier_indicators(profiles, titles, signals=runs[0][0].signals)
 
 
 def _variations(run: DrawnRun) -> str:
@@ -67,11 +68,15 @@ _ROWS = (
 
 @style.styled
 def fourier_indicators(
-    runs: Sequence[IndicatorProfiles], titles: Sequence[str] = (), names: Sequence[str] = ()
+    runs: Sequence[IndicatorProfiles],
+    titles: Sequence[str] = (),
+    names: Sequence[str] = (),
+    signals: str = "nodes",
 ) -> Figure:
     """Draw a column for each run: means as dots, one standard deviation to each side as a band.
 
-    `names` (N,) of the nodes label their axis. The default is their numbers from 0.
+    `names` (N,) of the nodes label their axis. The default is their numbers from 0. `signals` says
+    where u lives, "nodes", "links" or "triangles".
     """
     figure = style.new_figure(max(style.COLUMN, 2.35 * len(runs)), 4.6)
     axes = figure.subplots(3, len(runs), squeeze=False, sharex="col")
@@ -84,7 +89,7 @@ def fourier_indicators(
         axes[0, j].set_ylim(-np.pi - 0.3, np.pi + 0.3)
         axes[0, j].set_yticks([-np.pi, 0.0, np.pi], [r"$-\pi$", "0", r"$\pi$"])
         axes[0, j].set_title(titles[j] if j < len(titles) else "")
-        axes[2, j].set_xlabel("node" if names else "node $i$")
+        axes[2, j].set_xlabel("node" if names else style.signal_label(signals))
         if names:
             style.name_nodes(axes[2, j].xaxis, names, rotation=90)
     style.letter(list(axes[0]))

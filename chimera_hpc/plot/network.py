@@ -11,10 +11,12 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from chimera_hpc.network.layout import circle
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import FigureInput
 
-_LARGEST_NUMBERED = 24
+LARGEST_NUMBERED = 24
+"""Nodes of the largest network whose nodes are numbered."""
 
 
 def networks_figure(data: FigureInput) -> Figure | None:
@@ -43,7 +45,7 @@ def networks(panels: Sequence[tuple[str, ArrayLike]], reference: ArrayLike, n_no
 def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: int) -> None:
     """Draw node 0 at the top, the others clockwise, each link as a chord with an arrow."""
     ends, usual = np.asarray(links, dtype=np.int64), np.asarray(reference, dtype=np.int64)
-    places = node_places(n_nodes)
+    places = circle(n_nodes)
     turned = np.any(ends != usual, axis=1)
     size = min(0.14, 4.0 / len(ends))
     for chosen, colour, name, order in (
@@ -51,14 +53,14 @@ def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: in
         (turned, style.RED, "reoriented", 2.0),
     ):
         chords = places[ends[chosen]]
-        width = 0.9 if n_nodes <= _LARGEST_NUMBERED else 0.3 * order
+        width = 0.9 if n_nodes <= LARGEST_NUMBERED else 0.3 * order
         axes.add_collection(
             LineCollection(list(chords), colors=colour, linewidths=width, label=name, zorder=order)
         )
         heads = PolyCollection(list(arrow_heads(chords, size)), facecolors=colour, zorder=order)
         heads.set_linewidth(0.0)
         axes.add_collection(heads)
-    numbered = n_nodes <= _LARGEST_NUMBERED
+    numbered = n_nodes <= LARGEST_NUMBERED
     axes.scatter(
         places[:, 0], places[:, 1], s=150.0 if numbered else 14.0, color="#007a6e", zorder=3.0
     )
@@ -69,12 +71,6 @@ def draw_network(axes: Axes, links: ArrayLike, reference: ArrayLike, n_nodes: in
     axes.set_ylim(-1.18, 1.18)
     axes.set_aspect("equal")
     axes.set_axis_off()
-
-
-def node_places(n_nodes: int) -> NDArray[np.float64]:
-    """Return the places (n_nodes, 2) on the unit circle, node 0 at the top, then clockwise."""
-    angle = 0.5 * np.pi - 2.0 * np.pi * np.arange(n_nodes) / n_nodes
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def arrow_heads(chords: NDArray[np.float64], size: float) -> NDArray[np.float64]:

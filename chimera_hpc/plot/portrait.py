@@ -30,6 +30,7 @@ def ring_portrait(
     title: str = "",
     nullcline: bool = False,
     period: float | None = None,
+    signals: str = "nodes",
 ) -> Figure:
     """Draw the orbit of one node (0-based) over those of all, and all nodes at the last time.
 
@@ -38,6 +39,7 @@ def ring_portrait(
     node: its last twelve periods are drawn; of all nodes, in grey, the last one and a half.
     nullcline: whether the model has the cubic nullcline w = u - u^3 / 3.
     period: length of a period; None: whole orbits are drawn.
+    signals: where u lives, "nodes", "links" or "triangles".
     """
     figure, (axes,) = style.new_panels(1, style.COLUMN + 1.6, 3.2)
     time, across, along = (np.asarray(x) for x in (t, u, w))
@@ -63,12 +65,14 @@ def ring_portrait(
     lengths = ["", ""]
     if period is not None and np.isfinite(period):
         lengths = [f", last {n:g} periods" for n in (_LAST_PERIODS, _LAST_TURNS)]
-    axes.plot([], [], color=style.BLUE, label=f"node {node}{lengths[0]}")
-    axes.plot([], [], color=style.GREY, label=f"all nodes{lengths[1]}")
+    axes.plot([], [], color=style.BLUE, label=f"{style.SIGNALS[signals]} {node}{lengths[0]}")
+    axes.plot([], [], color=style.GREY, label=f"all {signals}{lengths[1]}")
     axes.set_xlabel("$u_i$")
     axes.set_ylabel("$w_i$")
     axes.set_title(title)
-    figure.colorbar(dots, ax=axes, label=f"node $i$ at $t$ = {time[-1]:g}", pad=0.02)
+    figure.colorbar(
+        dots, ax=axes, label=f"{style.signal_label(signals)} at $t$ = {time[-1]:g}", pad=0.02
+    )
     figure.legend(loc="outside lower center", ncols=2, handlelength=1.5)
     return figure
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import DrawnRun, FigureInput
+from chimera_hpc.plot.ordered import OrderedRows, in_order
 from chimera_hpc.plot.raster import NodeSeries, Raster, close_up, overview
 
 Panel = tuple[ArrayLike, NodeSeries]
@@ -34,7 +35,8 @@ def whole_run_figure(data: FigureInput) -> Figure | None:
 
 
 def _of_runs(runs: Sequence[DrawnRun]) -> Figure:
-    return space_time([(run.t, run.u) for run in runs], [run.title for run in runs])
+    panels = [(run.t, in_order(run.u, run.network, run.signals)) for run in runs]
+    return space_time(panels, [run.title for run in runs], signals=runs[0].signals)
 
 
 @style.styled
@@ -45,12 +47,14 @@ def space_time(
     columns: int = 3,
     symbol: str = "u_i(t)",
     names: Sequence[str] = (),
+    signals: str = "nodes",
 ) -> Figure:
     """Draw one panel for each (t, u): t (T,) uniform, u (N, T); one colour scale for all.
 
     If a series has more periods than a panel can show, the panel shows the range of u in each
     period, and a panel below it shows the last twelve periods of the run. `names` (N,) of the nodes
-    label their axis. The default is their numbers from 0.
+    label their axis. The default is their numbers from 0. `signals` says where u lives, "nodes",
+    "links" or "triangles". Of `OrderedRows`, lines show where another community begins.
     """
     columns = 2 if len(panels) == 4 and columns > 2 else min(columns, len(panels))
     upper = [overview(t, u, _DOTS // columns) for t, u in panels]
@@ -71,8 +75,11 @@ def space_time(
         if coarse:
             axes[row + 1, column].set_title(lower[i].length, loc="left", fontsize="small")
             draw_raster(axes[row + 1, column], lower[i], scales[False], names)
+        for frame, raster in zip(axes[row:, column], (upper[i], *lower[i : i + 1]), strict=False):
+            _draw_bounds(frame, panels[i][1], raster)
+    ordered = any(isinstance(u, OrderedRows) for _, u in panels)
     for left in axes[:, 0]:
-        left.set_ylabel("node $i$" if not names else "node")
+        left.set_ylabel("node" if names else style.signal_label(signals, ordered))
     for i, (row, column) in enumerate(place):
         if i + columns >= len(panels):
             axes[row + parts - 1, column].set_xlabel("time $t$")
@@ -103,6 +110,13 @@ def draw_raster(axes: Axes, raster: Raster, largest: float, names: Sequence[str]
     if names:
         style.name_nodes(axes.yaxis, names[: raster.nodes[1]])
     return image
+
+
+def _draw_bounds(axes: Axes, u: NodeSeries, raster: Raster) -> None:
+    """Draw a line where another community begins."""
+    for bound in u.bounds if isinstance(u, OrderedRows) else ():
+        if bound < raster.nodes[1]:
+            axes.axhline(bound - 0.5, color="white", linewidth=0.7)
 
 
 def _largest(rasters: Iterable[Raster], is_range: bool) -> float:

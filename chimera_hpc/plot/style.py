@@ -18,8 +18,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import to_hex, to_rgb
+from matplotlib.colors import Normalize, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -134,6 +135,23 @@ def draw_shares(axes: Axes, x: ArrayLike, y: ArrayLike, shares: ArrayLike) -> Qu
         cmap="viridis",
         rasterized=True,
     )
+
+
+def mappable(scale: Normalize, colours: str) -> ScalarMappable:
+    """Return what a colour bar of this scale and colour map shows."""
+    return ScalarMappable(scale, colours)
+
+
+SIGNALS = {"nodes": "node", "links": "link", "triangles": "triangle"}
+"""What one of the simplices that carry u is called."""
+
+
+def signal_label(signals: str, ordered: bool = False) -> str:
+    """Return the label of an axis along nodes, links or triangles.
+
+    ordered: whether they are in the order of the network instead of that of their numbers.
+    """
+    return f"{signals}, by community" if ordered else f"{SIGNALS[signals]} $i$"
 
 
 def set_ticks(axis: Axis, values: ArrayLike, **rules: Any) -> None:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from chimera_hpc.plot.figure_input import FigureInput
 
 RESULTS, FIGURES = "results.json", "figures"
-_OF_RUNS = {"space_time", "indicators", "incoherence"}
+_OF_RUNS = {"space_time", "indicators", "incoherence", "network_state"}
 """Figures that show runs with their features."""
 
 Say = Callable[[str], None]

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import Cut
 from chimera_hpc.classify.modes import count_votes
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.tables import Keep
+from chimera_hpc.network.network import Network
+from chimera_hpc.network.sweep_network import network_of
 from chimera_hpc.plot.figure_input import DrawnRun
 from chimera_hpc.plot.raster import NodeSeries
 from chimera_hpc.reduction.cells import FreeAxis, describe
@@ -46,7 +50,7 @@ def shown_runs(
                 say(f"not shown: {text}: {Status(int(status[i])).sentence}")
             else:
                 chosen.append(i)
-    return [_load(store, i, names[i] or "", triplets[i], axes) for i in chosen]
+    return [_load(store, i, names[i] or "", triplets[i], axes, say) for i in chosen]
 
 
 def representatives(sweep: Sweep, points: Points, cut: Cut) -> list[int]:
@@ -76,21 +80,48 @@ def whole_runs(
         if status.is_failure:
             say(f"not drawn: {text}: {status.sentence}")
             continue
-        runs.append(DrawnRun(_place(points.row(0), axes), sample_times(single), u.T))
+        row = points.row(0)
+        network, size = drawn_network(single, row, say), single.observed(points)[0]
+        made = DrawnRun(_place(row, axes), sample_times(single), u.T[:size])
+        runs.append(replace(made, network=network, signals=single.signals))
     return runs
 
 
 def _load(
-    store: Store, i: int, class_name: str, triplet: Array, axes: Sequence[FreeAxis]
+    store: Store,
+    i: int,
+    class_name: str,
+    triplet: Array,
+    axes: Sequence[FreeAxis],
+    say: Callable[[str], None],
 ) -> DrawnRun:
     """Return a run of the store; its series is computed again where it is not kept."""
-    place, features = _place(store.points.row(i), axes), None
+    row = store.points.row(i)
+    place, features = _place(row, axes), None
     oscillates = bool(np.isfinite(triplet).all())
     if oscillates:
-        block, row = divmod(i, store.block_size)
-        features = np.array(store.files.read("features", block)[row])
+        block, place_in_block = divmod(i, store.block_size)
+        features = np.array(store.files.read("features", block)[place_in_block])
+        features = features[:, : store.size(i)]
     t, u = sample_times(store.sweep), node_series(store, i)
-    return DrawnRun(place, t, u, class_name, features, triplet if oscillates else None)
+    return DrawnRun(
+        *(place, t, u, class_name, features, triplet if oscillates else None),
+        network=drawn_network(store.sweep, row, say),
+        signals=store.sweep.signals,
+    )
+
+
+def drawn_network(
+    sweep: Sweep, row: Mapping[str, int | float], say: Callable[[str], None]
+) -> Network | None:
+    """Return the network of a point to draw; None without [network], or where it cannot be made."""
+    if sweep.network is None:
+        return None
+    try:
+        return network_of(sweep, row)
+    except BadInput as error:
+        say(f"network not drawn: {error}")
+        return None
 
 
 def node_series(store: Store, i: int) -> NodeSeries:

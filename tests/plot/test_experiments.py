@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from chimera_hpc.network.layout import circle
 from chimera_hpc.plot import style
 from chimera_hpc.plot.agreement import (
     Comparison,
@@ -24,7 +25,7 @@ from chimera_hpc.plot.basin import basin
 from chimera_hpc.plot.class_number import class_number
 from chimera_hpc.plot.density import Density, density_classes
 from chimera_hpc.plot.incoherence import Strengths, incoherence
-from chimera_hpc.plot.network import arrow_heads, networks, node_places
+from chimera_hpc.plot.network import arrow_heads, networks
 from chimera_hpc.plot.raster import close_up
 from chimera_hpc.plot.robustness import Band, robustness
 from chimera_hpc.plot.spectrum import Spectrum, spectrum, vertex
@@ -136,7 +137,7 @@ def test_network_draws_reoriented_links_in_red(rendered: Render) -> None:
 
 
 def test_nodes_go_clockwise_from_the_top() -> None:
-    np.testing.assert_allclose(node_places(4), [[0, 1], [1, 0], [0, -1], [-1, 0]], atol=1e-15)
+    np.testing.assert_allclose(circle(4), [[0, 1], [1, 0], [0, -1], [-1, 0]], atol=1e-15)
 
 
 def test_arrow_points_to_the_head_of_the_link_at_its_middle() -> None:
