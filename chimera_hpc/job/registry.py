@@ -91,7 +91,7 @@ ANALYSES = {
 }
 """Functions of a `reduction.analyses.AnalysisInput` that return a dict for results.json."""
 
-RING_ANALYSES = ("networks", "stability", "basin", "robustness")
+RING_ANALYSES = ("networks", "stability", "basin")
 """Those that need the paper's ring, with its P, Q and orientation."""
 
 FIGURES = {

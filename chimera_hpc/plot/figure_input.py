@@ -18,7 +18,7 @@ from chimera_hpc.plot.style import drawn
 Array = NDArray[np.float64]
 
 
-_LINE = 30
+_LINE = 26
 """Letters that fit above a panel."""
 
 

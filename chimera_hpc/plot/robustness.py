@@ -1,4 +1,4 @@
-"""Fraction of chimeras after random reorientations, W(Q_r) (paper fig. 19)."""
+"""Fraction of chimeras along a parameter, as after random reorientations (paper fig. 19)."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
@@ -16,18 +17,21 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "orientation 1": {"color": style.GREEN, "marker": "*", "markersize": 6.5},
     "orientation 2": {"color": style.TEAL, "marker": "o", "markersize": 4.0},
 }
+REVERSED = "reversed links $Q_r$"
 _SPARE = ("#aa3377", "#997700", "#0057b8", "#777777")
 
 
 def robustness_figure(data: FigureInput) -> Figure | None:
-    """Draw W(Q_r), with the sweeps next to this one (paper fig. 19)."""
+    """Draw W(Q_r) (paper fig. 19), or W against a parameter of networks, and sweeps next to it."""
     curves = [*data.beside.values(), data.curves]
-    bands = {}
+    bands, label = {}, REVERSED
     for entry in (each["robustness"] for each in curves if "robustness" in each):
-        curve = entry["by"][entry["judge"]]
-        fraction, low, high = (numbers(curve[name]) for name in ("fraction", "low", "high"))
-        bands[entry["label"]] = Band(curve["x"], fraction, low, high)
-    return robustness(bands, label="reversed links $Q_r$") if bands else None
+        label = entry.get("symbol", REVERSED)
+        for each in entry.get("curves", [entry]):
+            curve = each["by"][entry["judge"]]
+            fraction, low, high = (numbers(curve[name]) for name in ("fraction", "low", "high"))
+            bands[each["label"]] = Band(curve["x"], fraction, low, high)
+    return robustness(bands, label=label) if bands else None
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,10 @@ def robustness(
             curve.x, curve.low, curve.high, color=look["color"], alpha=0.18, linewidth=0.0
         )
         axes.plot(curve.x, curve.fraction, linewidth=0.7, markeredgewidth=0.0, label=name, **look)
+    positive = np.concatenate([np.asarray(curve.x, float) for curve in curves.values()])
+    positive = positive[positive > 0.0]
+    if label != REVERSED and len(positive) and positive.max() >= 100.0 * positive.min():
+        axes.set_xscale("symlog", linthresh=positive.min())
     axes.set_ylim(-0.03, 1.03)
     axes.set_xlabel(label)
     axes.set_ylabel(value)

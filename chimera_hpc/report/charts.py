@@ -18,7 +18,7 @@ from bokeh.models import (
 from bokeh.models.annotations import Span
 from bokeh.plotting import figure
 
-MAP, TREE, PICTURE = "map", "tree", "picture"
+MAP, TREE, PICTURE, NETWORK = "map", "tree", "picture", "network"
 PROFILES = ("amplitude", "phase", "frequency")
 PLANES = (("V_theta", "V_a"), ("V_theta", "V_Omega"), ("V_a", "V_Omega"))
 _WORDS = {"V_theta": "V_θ", "V_a": "V_a", "V_Omega": "V_Ω", "phase": "phase (rad)"}
@@ -43,6 +43,8 @@ def sources() -> Sources:
         "leaves": ("x", "y", "colour", "line", "marker", "class", "runs"),
         "picture": ("url", "x", "y", "w", "h"),
         "profile": ("node", *ends),
+        "behind": ("xs", "ys"),
+        "marks": ("xs", "ys", "colour", "number", "value"),
     }
     return {
         name: ColumnDataSource({key: [] for key in keys}, name=f"source-{name}")
@@ -147,23 +149,45 @@ def projections(made: Sources, largest: Mapping[str, float]) -> dict[str, figure
     return plots
 
 
-def picture(made: Sources, n_nodes: int) -> figure:
-    """Return the frame for the space-time picture of a run."""
+def picture(made: Sources, n_nodes: int, label: str) -> figure:
+    """Return the frame for the space-time picture of a run; `label` is that of its nodes."""
     plot = _figure(PICTURE, 460, x_range=_range(0.0, 1.0), tools="box_zoom,reset,save")
     plot.y_range = _range(-0.5, n_nodes - 0.5)
-    plot.xaxis.axis_label, plot.yaxis.axis_label = "time t", "node i"
+    plot.xaxis.axis_label, plot.yaxis.axis_label = "time t", label
     plot.grid.visible = False
     plot.image_url("url", "x", "y", "w", "h", source=made["picture"], anchor="bottom_left")
     return plot
 
 
-def profiles(made: Sources, n_nodes: int) -> dict[str, figure]:
+def network(made: Sources, signals: str) -> figure:
+    """Return the frame for the network of a run, which the page's script fills and colours.
+
+    signals: where u lives; nodes are dots, links lines and triangles areas.
+    """
+    plot = _figure(NETWORK, 400, match_aspect=True, tools="box_zoom,reset,save,pan,wheel_zoom")
+    plot.x_range, plot.y_range = _range(-1.1, 1.1), _range(-1.1, 1.1)
+    plot.axis.visible = plot.grid.visible = False
+    plot.multi_line("xs", "ys", source=made["behind"], line_color="#c4c4c4", line_width=0.8)
+    if signals == "nodes":
+        look = {"size": 9, "fill_color": "colour", "line_color": _INK, "line_width": 0.5}
+        marks = plot.scatter("xs", "ys", source=made["marks"], **look)
+    elif signals == "links":
+        marks = plot.multi_line("xs", "ys", source=made["marks"], line_color="colour", line_width=3)
+    else:
+        look = {"fill_color": "colour", "fill_alpha": 0.55, "line_color": None}
+        marks = plot.patches("xs", "ys", source=made["marks"], **look)
+    word = signals.removesuffix("s")
+    plot.add_tools(HoverTool(renderers=[marks], tooltips=[(word, "@number"), ("", "@value")]))
+    return plot
+
+
+def profiles(made: Sources, n_nodes: int, label: str) -> dict[str, figure]:
     """Return the profiles of the Fourier features over the nodes, plus and minus one deviation."""
     plots = {}
     for name in PROFILES:
         plot = _figure(name, 200, x_range=_range(-1.0, n_nodes), tools="box_zoom,reset")
         plot.y_range = _range(0.0, 1.0)
-        plot.xaxis.axis_label, plot.yaxis.axis_label = "node i", _WORDS.get(name, name)
+        plot.xaxis.axis_label, plot.yaxis.axis_label = label, _WORDS.get(name, name)
         ends = ("node", f"{name}_low", "node", f"{name}_high")
         plot.segment(*ends, source=made["profile"], line_color="#7a7a7a")
         plot.scatter("node", name, source=made["profile"], size=5, color="#0057b8")
@@ -171,10 +195,10 @@ def profiles(made: Sources, n_nodes: int) -> dict[str, figure]:
     return plots
 
 
-def robustness(entries: Mapping[str, Mapping[str, Any]]) -> figure:
+def robustness(entries: Mapping[str, Mapping[str, Any]], axis: str) -> figure:
     """Return shares of chimeras with their bands; `entries` as in results.json's ``curves``."""
     plot = _figure("robustness", 340, tools="box_zoom,reset,save", y_range=_range(-0.03, 1.03))
-    plot.xaxis.axis_label, plot.yaxis.axis_label = "reversed links Q_r", "share of chimeras W"
+    plot.xaxis.axis_label, plot.yaxis.axis_label = axis, "share of chimeras W"
     for i, (label, curve) in enumerate(entries.items()):
         colour, marker = _BAND_LOOKS[i % len(_BAND_LOOKS)]
         names = ("x", "fraction", "low", "high")
@@ -184,7 +208,7 @@ def robustness(entries: Mapping[str, Mapping[str, Any]]) -> figure:
         dots = plot.scatter(
             *("x", "fraction"), source=band, marker=marker, size=7, color=colour, legend_label=label
         )
-        tooltips = [("Q_r", "@x"), ("W", "@fraction{0.000}"), ("band", "@low{0.00} - @high{0.00}")]
+        tooltips = [(axis, "@x"), ("W", "@fraction{0.000}"), ("band", "@low{0.00} - @high{0.00}")]
         plot.add_tools(HoverTool(renderers=[dots], tooltips=tooltips))
     plot.legend.location = "top_right"
     plot.legend.background_fill_alpha = 0.8

@@ -21,6 +21,7 @@ from chimera_hpc import __version__
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
+from chimera_hpc.plot.style import SIGNALS, signal_label
 from chimera_hpc.reduction.agreement_text import (
     CAPTION,
     cluster_lines,
@@ -42,7 +43,7 @@ from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.report import charts
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.payload import Shown, axis_labels, payload
-from chimera_hpc.report.pictures import MOST_CELLS, plates
+from chimera_hpc.report.pictures import MOST_CELLS, Plates, plates
 from chimera_hpc.report.tree_top import top_of
 from chimera_hpc.store.runs import read_run, read_work, run_numbers
 
@@ -97,7 +98,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
     shown = Shown.of(content)
     pictured = plates(content, shown.cells, most_pictures, replay)
     top = top_of(content.classification.linkage)
-    figures = _figures(content, len(top.sizes))
+    figures = _figures(content, len(top.sizes), pictured)
     loader = PackageLoader("chimera_hpc.report")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
     variables = {
@@ -108,6 +109,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "axes": axis_labels(content),
         "outcomes": _outcomes(content),
         "warnings": content.results.get("warnings", []),
+        "robustness_axis": _robustness_axis(content),
         "failures": _failures(content),
         "most_failures": MOST_FAILURES,
         "runs": _runs(content),
@@ -118,6 +120,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "agreement": _agreement(content),
         "chains": chain_lines(content.results),
         "clusters": cluster_lines(content.results.get("curves", {})),
+        "carrier": SIGNALS[content.store.sweep.signals],
         "names": {name: list(group) for name, group in _groups(figures).items()},
         "script": loader.get_source(environment, "report.js")[0],
         "style": loader.get_source(environment, "report.css")[0],
@@ -131,8 +134,9 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
     )
 
 
-def _figures(content: Content, n_branches: int) -> dict[str, figure]:
-    n_nodes = content.store.sweep.n_observed
+def _figures(content: Content, n_branches: int, pictured: Plates) -> dict[str, figure]:
+    n_nodes, signals = content.store.sweep.n_observed, content.store.sweep.signals
+    along, up = (signal_label(signals, x).replace("$", "") for x in (False, pictured.ordered))
     made = charts.sources()
     height = float(content.classification.linkage[:, 2].max(initial=0.0)) or 1.0
     figures = {charts.MAP: charts.cell_map(made, axis_labels(content))}
@@ -140,36 +144,46 @@ def _figures(content: Content, n_branches: int) -> dict[str, figure]:
         figures[charts.TREE] = charts.tree(made, height, n_branches)
         largest = np.nanmax(content.triplets, axis=0).tolist()
         figures |= charts.projections(made, dict(zip(TRIPLET, largest, strict=True)))
-    figures[charts.PICTURE] = charts.picture(made, n_nodes)
-    figures |= charts.profiles(made, n_nodes)
+    figures[charts.PICTURE] = charts.picture(made, n_nodes, up)
+    figures |= charts.profiles(made, n_nodes, along)
+    if pictured.networks:
+        figures[charts.NETWORK] = charts.network(made, signals)
     curves = _robustness(content)
     if curves:
-        figures["robustness"] = charts.robustness(curves)
+        figures["robustness"] = charts.robustness(curves, _robustness_axis(content))
     if cells := content.results.get("hysteresis"):
         first, chains = cells[0], content.results["chains"][:_MOST_CHAINS]
         figures["hysteresis"] = charts.hysteresis(chains, first["along"], first["order"])
     return figures
 
 
+_OTHERS = (charts.TREE, charts.NETWORK, "robustness", "hysteresis")
+
+
 def _groups(figures: Mapping[str, figure]) -> dict[str, list[str]]:
     return {
         "planes": [name for name in figures if name.startswith("plane")],
         "profiles": [name for name in figures if name in charts.PROFILES],
-        "others": [name for name in figures if name in (charts.TREE, "robustness", "hysteresis")],
+        "others": [n for n in figures if n in _OTHERS],
     }
 
 
 def _robustness(content: Content) -> dict[str, Mapping[str, Any]]:
-    """Return the curves W(Q_r) of this sweep and of those it is drawn with, by their labels."""
+    """Return the curves W of this sweep and of those it is drawn with, by their labels."""
     beside = content.store.sweep.reduction.beside
     others = curves_beside(content.folder, beside, lambda line: None)
     found = {}
     for curves in (content.results.get("curves", {}), *others.values()):
         entry = curves.get("robustness")
-        for judge, curve in (entry or {"by": {}})["by"].items():
-            label = str(entry["label"]).replace("$", "")
-            found[f"{label}, judged by {judge}"] = curve
+        for each in entry.get("curves", [entry]) if entry else ():
+            label = str(each.get("plain", each["label"])).replace("$", "")
+            found |= {f"{label}, judged by {name}": curve for name, curve in each["by"].items()}
     return found
+
+
+def _robustness_axis(content: Content) -> str:
+    entry = content.results.get("curves", {}).get("robustness", {})
+    return str(entry.get("axis", "reversed links Q_r"))
 
 
 def _agreement(content: Content) -> dict[str, Any]:

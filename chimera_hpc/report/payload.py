@@ -13,7 +13,7 @@ from chimera_hpc.classify.classification import has_triplet
 from chimera_hpc.reduction.quality import poor_classes
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import looks_of
-from chimera_hpc.report.pictures import Plates, rounded
+from chimera_hpc.report.pictures import Plates, palette, rounded
 from chimera_hpc.report.tree_top import TreeTop
 
 MOST_CELLS = 10_000
@@ -76,7 +76,13 @@ def payload(content: Content, shown: Shown, plates: Plates, top: TreeTop) -> dic
         "cuts": {str(k): _cut(content, shown, top, k) for k in content.cuts},
         "tree": {"xs": top.xs, "ys": top.ys, "ends": top.ends, "sizes": top.sizes},
         "plates": {str(row_of[i]): plate for i, plate in plates.by_cell.items() if row_of[i] >= 0},
+        "networks": list(plates.networks),
+        "palettes": {name: _colours(name) for name in ("viridis", "twilight") if plates.networks},
     }
+
+
+def _colours(name: str) -> list[str]:
+    return ["#" + bytes(colour).hex() for colour in palette(name)]
 
 
 def _cells(content: Content, shown: Shown) -> dict[str, Any]:

@@ -19,8 +19,10 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.modes import vote_labels
 from chimera_hpc.job.tables import Keep
+from chimera_hpc.plot.ordered import in_order
 from chimera_hpc.plot.raster import NodeSeries, bins, close_up
 from chimera_hpc.report.content import Content
+from chimera_hpc.report.networks import DrawnNetworks
 from chimera_hpc.store.schema import FEATURES, sample_times, series_mask
 
 Array = NDArray[np.float64]
@@ -53,6 +55,10 @@ class Plates:
     most_cells: int
     replay: bool
     """Whether runs were replayed whose series the store does not keep."""
+    networks: Sequence[dict[str, Any]] = ()
+    """Networks that the key `network` of cells numbers, see `report.networks`."""
+    ordered: bool = False
+    """Whether rows of the pictures are in the order of the network."""
 
     @property
     def sentence(self) -> str:
@@ -89,6 +95,7 @@ def plates(
     others = others[: affordable(content) if replay else 0]
     pictured = [*stored, *others]
     plain = [i for i in spread if i not in set(pictured)]
+    networks = DrawnNetworks(content, _STEPS)
     series = _all_series(content, [int(chosen[i]) for i in pictured])
     profiles = _profiles_of(content, chosen[spread])
     made: dict[int, dict[str, Any]] = {}
@@ -96,13 +103,21 @@ def plates(
     for k, i in enumerate((*pictured, *plain)):
         plate = _plate(content, int(chosen[i]), profiles[int(chosen[i])])
         if k < len(pictured):
-            plate |= _picture(*next(series))
+            t, u = next(series)
+            network, signals = networks.of(int(chosen[i])), content.store.sweep.signals
+            plate |= _picture(t, in_order(u, network, signals))
+        if (number := networks.number(int(chosen[i]))) is not None:
+            plate["network"] = number
         size += len(json.dumps(plate))
         if size > MOST_BYTES:
             break
         made[i] = plate
     images = sum("image" in plate for plate in made.values())
-    return Plates(made, int((chosen >= 0).sum()), images, most_cells, replay)
+    return Plates(
+        *(made, int((chosen >= 0).sum()), images, most_cells, replay),
+        networks=networks.drawn,
+        ordered=networks.ordered(chosen[pictured[:1]].tolist()),
+    )
 
 
 def representatives(content: Content) -> NDArray[np.int64]:
@@ -230,9 +245,9 @@ def _png(values: Array) -> str:
     return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
 
 
-def palette() -> NDArray[np.uint8]:
+def palette(name: str = "viridis") -> NDArray[np.uint8]:
     """Return the colours of the pictures, (n, 3)."""
-    colours = mpl.colormaps["viridis"](np.linspace(0.0, 1.0, _COLOURS))[:, :3]
+    colours = mpl.colormaps[name](np.linspace(0.0, 1.0, _COLOURS))[:, :3]
     return np.asarray(255 * colours).round().astype(np.uint8)
 
 

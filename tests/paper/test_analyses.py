@@ -16,6 +16,8 @@ from chimera_hpc.classify.stability import (
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.registry import ANALYSES, load
 from chimera_hpc.network.topology import Topology
+from chimera_hpc.plot.figure_input import FigureInput
+from chimera_hpc.plot.robustness import robustness_figure
 from chimera_hpc.reduction.agreement_text import (
     agreement_lines,
     cluster_lines,
@@ -34,9 +36,13 @@ ATLAS = Atlas(
 )
 
 
-def given(grid: dict, status: list[int], atlases=None, reduction=None, **scalars) -> AnalysisInput:
+def given(
+    grid: dict, status: list[int], atlases=None, reduction=None, network=None, **scalars
+) -> AnalysisInput:
     """A tiny finished sweep; scalars that are not named are NaN."""
     tables = {"grid": grid, "reduction": reduction or {}, "features": {"groups": 2}}
+    if network is not None:
+        tables["network"] = network
     sweep = Sweep.from_dict({"name": "tiny", "model": "topological_fhn", **tables})
     points, n = sweep.points(), len(status)
     names = ["V_theta", "V_a", "V_Omega", "sigma_1", "range_u", "distance"]
@@ -142,6 +148,29 @@ def test_robustness_is_the_share_of_chimeras_by_reversed_links() -> None:
     assert (curve["hits"], curve["trials"]) == ([2, 0], [2, 2])
     assert (curve["holds_until"], curve["zero_from"]) == (0.0, 5.0)
     np.testing.assert_array_equal(curve["others"]["disordered"], [0.0, 0.5])
+
+
+def test_robustness_on_networks_goes_along_the_parameter_with_most_values() -> None:
+    runs = given(
+        {"P": [2, 3], "rewire": [0.0, 0.1, 0.5], "network_seed": 2},
+        [DONE] * 12,
+        {"other": ATLAS},
+        network={"kind": "small_world"},
+        V_theta=[0.3, 0.3, 0.3, 0.5, 0.5, 0.5, *[0.3] * 6],
+        V_a=[0.1, 0.1, 0.1, 0.0, 0.0, 0.0, *[0.1] * 6],
+        V_Omega=[0.1, 0.1, 0.1, 0.0, 0.0, 0.0, *[0.1] * 6],
+    )
+    made = load(ANALYSES["robustness"])(runs)
+    assert (made["axis"], made["judge"]) == ("rewire", "other")
+    assert [curve["plain"] for curve in made["curves"]] == ["P = 2", "P = 3"]
+    first, second = (curve["by"]["other"] for curve in made["curves"])
+    assert (first["x"], first["hits"], first["trials"]) == ([0.0, 0.1, 0.5], [2, 1, 0], [2, 2, 2])
+    assert second["hits"] == [2, 2, 2]
+    figure = robustness_figure(FigureInput(runs.classification, runs.triplets, [], {}, curves={
+        "robustness": made}))  # fmt: skip
+    assert figure.axes[0].get_xlabel() == r"$\mathrm{rewire}$"
+    with pytest.raises(BadInput, match='no parameter of the network "small_world" varies'):
+        load(ANALYSES["robustness"])(given({"P": 2}, [DONE], network={"kind": "small_world"}))
 
 
 def test_incoherence_scales_delta_by_the_range_of_each_run() -> None:

@@ -210,7 +210,7 @@ def test_robustness_curves_have_a_chart(tmp_path, filled):
     entry = {"label": "orientation 1, $Q$ = 0", "judge": "diagonal", "by": {"diagonal": curve}}
     reduce_sweep(tmp_path, curves={"robustness": entry})
     page = page_of(tmp_path)
-    assert "Share of chimeras against the number of reversed links" in words_of(page)
+    assert "Share of chimeras against reversed links Q_r" in words_of(page)
     assert "orientation 1, Q = 0, judged by diagonal" in page
 
 

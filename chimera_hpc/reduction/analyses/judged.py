@@ -7,13 +7,20 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.classify.robustness import fraction_curve
+from chimera_hpc.job.networks import NETWORK_SEED, kind_parameters
 from chimera_hpc.reduction.analysis_input import AnalysisInput
+from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
 
+_OWN = "own classes"
+_NO_CURVES = {"seed", NETWORK_SEED.name}
+"""Axes over whose values a share is taken."""
 _FIRST, _LAST = CLASSES, (STEADY, NO_WINDOW)
 
 
@@ -68,15 +75,60 @@ def _in_order(votes: Counter[Any]) -> list[str]:
 
 
 def robustness(given: AnalysisInput) -> dict[str, Any]:
-    """W: share of chimeras by each atlas against the number of reversed links (fig. 19)."""
+    """W: share of chimeras by each atlas against the number of reversed links (fig. 19).
+
+    With [network], W against a parameter of the network, see `along_network`.
+    """
+    if given.sweep.network is not None:
+        return along_network(given)
     given.need_atlas()
-    flips = given.points.columns["flips"]
+    row = given.points.row(0)
+    return {
+        "judge": next(iter(given.atlases)),
+        "orientation": row["orientation"],
+        "Q": row["Q"],
+        "label": _label(given),
+        "by": _curves(given, "flips", np.ones(len(given.cell), dtype=np.bool_)),
+    }
+
+
+def along_network(given: AnalysisInput) -> dict[str, Any]:
+    """W against the parameter of the network that has most values, for each value of other axes.
+
+    The judges are the atlases, or the sweep's own classes where there are none.
+    """
+    table = given.sweep.network
+    assert table is not None
+    known = {p.name for p in kind_parameters(table.kind)} - {NETWORK_SEED.name}
+    values = {n: len(np.unique(given.cells[n])) for n in given.points.axes if n in known}
+    axis = max(values, key=lambda name: values[name], default=None)
+    if axis is None or values[axis] < 2:
+        raise BadInput(f'no parameter of the network "{table.kind}" varies')
+    others = free_axes(given.cells, [n for n in given.points.axes if n not in _NO_CURVES | {axis}])
+    keys = np.stack([np.zeros(given.n_cells), *(each.values for each in others)])
+    _, first, group = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+    curves = [
+        {
+            "label": describe(given.place(int(cell)), others, math=True) or table.kind,
+            "plain": describe(given.place(int(cell)), others) or table.kind,
+            "by": _curves(given, axis, group.ravel()[given.cell] == number),
+        }
+        for number, cell in enumerate(first.tolist())
+    ]
+    symbol = FreeAxis((axis,), given.cells[axis]).symbol
+    judge = next(iter(given.atlases), _OWN)
+    return {"judge": judge, "axis": axis, "symbol": symbol, "curves": curves}
+
+
+def _curves(given: AnalysisInput, axis: str, among: NDArray[np.bool_]) -> dict[str, dict[str, Any]]:
+    """Return W of some runs (n,) against a parameter, by each judge."""
+    x, counted = given.points.columns[axis][among], given.has_result[among]
+    judges = {name: given.judged_names(judge) for name, judge in given.atlases.items()}
     curves = {}
-    for name, judge in given.atlases.items():
-        verdicts = given.judged_names(judge)
-        curve = fraction_curve(flips, _is(verdicts, "chimera"), given.has_result)
+    for name, verdicts in (judges or {_OWN: given.own_names()}).items():
+        curve = fraction_curve(x, _is(verdicts, "chimera")[among], counted)
         others = {
-            other: fraction_curve(flips, _is(verdicts, other), given.has_result).fraction
+            other: fraction_curve(x, _is(verdicts, other)[among], counted).fraction
             for other in ("ordered", "disordered", STEADY)
         }
         curves[name] = {
@@ -86,14 +138,7 @@ def robustness(given: AnalysisInput) -> dict[str, Any]:
             "half_at": _falls_below(curve.x, curve.fraction, 0.5),
             "zero_from": _zero_from(curve.x, curve.fraction),
         }
-    row = given.points.row(0)
-    return {
-        "judge": next(iter(given.atlases)),
-        "orientation": row["orientation"],
-        "Q": row["Q"],
-        "label": _label(given),
-        "by": curves,
-    }
+    return curves
 
 
 def _label(given: AnalysisInput) -> str:
@@ -104,8 +149,10 @@ def _label(given: AnalysisInput) -> str:
     return label if row["orientation"] == 2 or row["Q"] else f"{label}, $Q$ = 0"
 
 
-def _is(verdicts: Sequence[str | None], name: str) -> list[bool]:
-    return [verdict == name for verdict in verdicts]
+def _is(verdicts: Sequence[str | None], name: str) -> NDArray[np.bool_]:
+    """Tell which verdicts are a class or one of its sub-classes."""
+    parts = [str(verdict).rpartition("-") for verdict in verdicts]
+    return np.array([name in ("".join(p), p[0] if p[2].isdigit() else "") for p in parts])
 
 
 def _falls_below(x: tree.Floats, fraction: tree.Floats, level: float) -> float | None:

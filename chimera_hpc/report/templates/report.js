@@ -256,6 +256,44 @@
       }
       source("profile").data = columns;
     }
+    drawNetwork(plate);
+  }
+
+  // The network is laid out once; only its colours belong to the run.
+  function drawNetwork(plate) {
+    if (!source("marks")) return;
+    const drawn = data.networks[plate.network];
+    $("has-network").hidden = !drawn;
+    if (!drawn) return;
+    for (const option of $("network-by").options) option.disabled = option.value !== "class" && !plate.amplitude;
+    const by = plate.amplitude ? $("network-by").value : "class", values = plate[by];
+    $("network-by").value = by;
+    $("network-scale").hidden = !values;
+    const at = (i) => [drawn.x[i], drawn.y[i]], columns = { xs: [], ys: [], colour: [], number: [], value: [] };
+    const paint = values ? painter(by, values) : () => cut().looks[plate.classes[state.cut]]?.colour ?? "#8a8a8a";
+    drawn.marks.forEach((corners, k) => {
+      const [xs, ys] = [corners.map((i) => at(i)[0]), corners.map((i) => at(i)[1])];
+      columns.xs.push(xs.length > 1 ? xs : xs[0]);
+      columns.ys.push(ys.length > 1 ? ys : ys[0]);
+      columns.colour.push(values ? paint(values[k]) : paint());
+      columns.number.push(plate.node ? plate.node[k] : k);
+      columns.value.push(values ? `${by} ${values[k]}` : "");
+    });
+    source("behind").data = { xs: drawn.behind.map((pair) => pair.map((i) => at(i)[0])), ys: drawn.behind.map((pair) => pair.map((i) => at(i)[1])) };
+    source("marks").data = columns;
+    $("network-part").textContent = drawn.partly;
+  }
+
+  function painter(by, values) {
+    const palette = data.palettes[by === "phase" ? "twilight" : "viridis"], some = values.filter((v) => v !== null);
+    const [low, high] = by === "phase" ? [-Math.PI, Math.PI] : [Math.min(...some), Math.max(...some)];
+    // What is the same everywhere is to look so, whatever its last digits.
+    const margin = high - low > 0.01 * Math.max(Math.abs(low), Math.abs(high)) ? 0 : 0.01 * Math.max(Math.abs(high), 1e-9);
+    $("network-low").textContent = (low - margin).toPrecision(3);
+    $("network-high").textContent = (high + margin).toPrecision(3);
+    $("network-ramp").style.background = `linear-gradient(to right, ${palette.filter((_, i) => i % 9 === 0).join(", ")})`;
+    const share = (v) => (v - low + margin) / (high - low + 2 * margin || 1);
+    return (v) => v === null ? "#8a8a8a" : palette[Math.max(0, Math.min(palette.length - 1, Math.floor(share(v) * palette.length)))];
   }
 
   function setRange(range, low, high) {
@@ -330,6 +368,7 @@
     $("cut").max = String(cutNames.length - 1);
     $("cut").disabled = cutNames.length < 2;
     $("cut").addEventListener("input", (event) => setCut(cutNames[Number(event.target.value)]));
+    $("network-by")?.addEventListener("change", () => { if (state.row !== null && data.plates[state.row]) drawNetwork(data.plates[state.row]); });
     $("shade")?.addEventListener("change", (event) => { state.shade = event.target.value; drawMap(); });
     for (const picker of document.querySelectorAll(".slice")) {
       state.slice[Number(picker.dataset.axis)] = 0;
