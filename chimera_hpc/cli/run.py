@@ -71,8 +71,8 @@ def execute(args: Namespace) -> int:
 
 
 def check_drawing(sweep: Sweep) -> None:
-    """Raise BadInput if a user's model is another one in another process."""
-    if ":" in sweep.model:
+    """Raise BadInput if a user's model or network is another one in another process."""
+    if sweep.has_own_code:
         from chimera_hpc.run.second_draw import check_in_second_process
 
         check_in_second_process(sweep)

@@ -53,7 +53,9 @@ def parameters_of(
     known = getattr(kind, "signals", ("nodes",))
     if network is not None and network.signals not in known:
         raise BadInput(f'network.signals: "{network.signals}": {short(name)} knows {known[0]} only')
-    return on_network(kind.parameters, network) if _general(kind, network) else kind.parameters
+    if not _general(kind, network):
+        return kind.parameters
+    return on_network(kind.parameters, network, origin)
 
 
 def _how(name: str) -> str:
@@ -97,7 +99,7 @@ def try_networks(sweep: Sweep) -> None:
     pairs that variations need.
     """
     assert sweep.network is not None
-    points, names = sweep.points(), distinct(sweep.network.kind)
+    points, names = sweep.points(), distinct(sweep)
     first, _ = groups_of(points.columns, names)
     for i in sorted(first)[:MOST_TRIED]:
         row = points.row(i)
@@ -118,10 +120,14 @@ def try_networks(sweep: Sweep) -> None:
 
 
 def model_folder(sweep: Sweep) -> str | None:
-    """Return the folder of the module of a user's model; None for other models."""
-    if ":" not in sweep.model:
+    """Return the folder of the module of a user's model or else network; None without either."""
+    if not sweep.has_own_code:
         return None
     if sweep.origin.table is not None:
         return sweep.origin.folders[0]
-    found = user_source(sweep.model, sweep.origin)
+    if ":" in sweep.model:
+        found = user_source(sweep.model, sweep.origin)
+    else:
+        assert sweep.own_network is not None
+        found = sweep.own_network.source
     return None if found is None else str(found.folder)

@@ -22,7 +22,7 @@ from chimera_hpc.network.sweep_network import RING, read_file
 
 
 def _known_kind(value: str) -> str:
-    if value not in KINDS:
+    if value not in KINDS and ":" not in value:
         raise BadInput(f"network.kind: {short(value)} is unknown{nearest(value, list(KINDS))}")
     return value
 
@@ -32,16 +32,19 @@ class NetworkTable(Table):
 
     kind: Annotated[str, AfterValidator(_known_kind)] = Field(
         RING,
-        description="Kind of network; its parameters are axes or fixed, like those of the model.",
-        json_schema_extra={"enum": list(KINDS)},
+        description="Kind of network, or your own function module:function; its parameters are "
+        "axes or fixed, like those of the model.",
+        json_schema_extra={"anyOf": [{"enum": list(KINDS)}, {"pattern": ":"}]},
     )
     file: Line | None = Field(
         None,
         description='File of kind = "file", from the folder of the job: a list of edges, GraphML, '
         "GML, JSON, or a matrix.",
     )
-    triangles: Literal["none", "cliques"] = Field(
-        "none", description="Triangles of the network: none, or all triples of linked nodes."
+    triangles: Literal["none", "cliques", "given"] = Field(
+        "none",
+        description="Triangles of the network: none, all triples of linked nodes, or those that "
+        "the file or your function gives.",
     )
     signals: Literal["nodes", "links", "triangles"] = Field(
         "nodes", description="Where the observed signal u lives."
@@ -63,8 +66,8 @@ class NetworkTable(Table):
         path = found_in(name, info.context)
         try:
             network, digest = read_file(path)
-            if given.get("triangles", "none") == "cliques":
-                network = network.with_triangles("cliques")
+            if (triangles := given.get("triangles", "none")) in ("none", "cliques"):
+                network = network.with_triangles(triangles)
         except BadInput as error:
             raise BadInput(f"network.file: {error}") from None
         return {
@@ -80,6 +83,8 @@ class NetworkTable(Table):
             raise BadInput('network.file: needed with kind = "file", and only with that')
         if self.signals == "triangles" and self.triangles == "none":
             raise BadInput('network.signals: "triangles" needs triangles = "cliques"')
+        if self.triangles == "given" and self.kind != "file" and ":" not in self.kind:
+            raise BadInput('network.triangles: "given" is for a file or a function of yours')
         return self
 
     @property

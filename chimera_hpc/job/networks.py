@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.job.own_networks import own_maker
+from chimera_hpc.job.user_models import Origin
 from chimera_hpc.models.parameters import RING_LIMIT, Column, Limit, ModelParameters, Parameter
 from chimera_hpc.models.topological_fhn import PARAMETERS as ON_THE_RING
 from chimera_hpc.network.complex import SIGNALS
@@ -74,18 +76,26 @@ _TURNS = ("Q", "orientation", "flips", "flip_set")
 _DIVISORS = {"columns": "n_nodes / columns rows", "layers": "layers of equal size"}
 
 
-def kind_parameters(kind: str) -> tuple[Parameter, ...]:
-    """Return all parameters that a kind of network adds to a model."""
-    return KINDS[kind] if kind == RING else (*KINDS[kind], NETWORK_SEED, _FLIPS)
+def kind_parameters(kind: str, origin: Origin | None = None) -> tuple[Parameter, ...]:
+    """Return all parameters that a kind of network adds to a model.
+
+    `origin` tells where the module of a kind ``module:function`` is looked for.
+    """
+    if kind == RING:
+        return KINDS[kind]
+    own = own_maker(kind, origin).parameters if ":" in kind else KINDS[kind]
+    return (*own, NETWORK_SEED, _FLIPS)
 
 
-def on_network(model: ModelParameters, table: NetworkTable | None) -> ModelParameters:
+def on_network(
+    model: ModelParameters, table: NetworkTable | None, origin: Origin | None = None
+) -> ModelParameters:
     """Return the parameters of a model on a network of [network], or on a ring without it.
 
     The network's parameters come first; those of the model's own ring are left out.
     """
     kind = RING if table is None else table.kind
-    added = kind_parameters(kind)
+    added = kind_parameters(kind, origin)
     own = tuple(p for p in model.parameters if p.name not in RING_PARAMETERS)
     names = {p.name for p in added}
     if clash := names & {p.name for p in own}:
@@ -110,7 +120,7 @@ def _limits(kind: str) -> tuple[Limit, ...]:
     if kind == "multiplex":
         text = "2 P must be smaller than the nodes of a layer"
         return (Limit("P", ("layers",), lambda x, n: (n // x["layers"] - 1) // 2, text),)
-    return tuple(_LIMITS[p.name] for p in KINDS[kind] if p.name in _LIMITS)
+    return tuple(_LIMITS[p.name] for p in KINDS.get(kind, ()) if p.name in _LIMITS)
 
 
 def _of_ring(limit: Limit) -> bool:
@@ -127,7 +137,7 @@ def observed_sizes(sweep: Sweep, columns: Mapping[str, Column]) -> NDArray[np.in
         return np.full(n_points, sweep.n_nodes)
     if table.sizes is not None:
         return np.full(n_points, table.sizes[SIGNALS.index(table.signals)])
-    names = [name for name in distinct(table.kind) if name not in _TURNS]
+    names = [name for name in distinct(sweep) if name not in _TURNS]
     first, of_point = groups_of(columns, names)
     plain = dict.fromkeys(_TURNS, 0) | {"orientation": 1}
     rows = [{name: column[i].item() for name, column in columns.items()} | plain for i in first]
@@ -135,9 +145,10 @@ def observed_sizes(sweep: Sweep, columns: Mapping[str, Column]) -> NDArray[np.in
     return np.array(sizes)[of_point]
 
 
-def distinct(kind: str) -> list[str]:
-    """Return the names of the parameters in which the networks of a kind differ."""
-    return [p.name for p in kind_parameters(kind)]
+def distinct(sweep: Sweep) -> list[str]:
+    """Return the names of the parameters in which the networks of a sweep differ."""
+    assert sweep.network is not None
+    return [p.name for p in kind_parameters(sweep.network.kind, sweep.origin)]
 
 
 def groups_of(
@@ -157,7 +168,7 @@ def check_sizes(kind: str, n_nodes: int, values: Mapping[str, Any]) -> None:
     if kind == "two_populations" and n_nodes % 2:
         raise BadInput(f"fixed.n_nodes: {n_nodes} is odd; two populations have an even number")
     for name, text in _DIVISORS.items():
-        if name not in {p.name for p in KINDS[kind]}:
+        if name not in {p.name for p in KINDS.get(kind, ())}:
             continue
         for value in values[name]:
             if n_nodes % value:

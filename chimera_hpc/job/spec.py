@@ -45,6 +45,7 @@ from chimera_hpc.job.digest import explain_difference, spec_digest
 from chimera_hpc.job.models import parameters_of
 from chimera_hpc.job.network_table import NetworkTable
 from chimera_hpc.job.networks import check_sizes, observed_sizes
+from chimera_hpc.job.own_networks import OwnMaker, own_maker
 from chimera_hpc.job.parameters import DELTA, DIRECTION, SEED, fixed_schema, grid_schema
 from chimera_hpc.job.points import DTYPES, Points, Product, appended, expand
 from chimera_hpc.job.reading import apply_overrides, bad, one_line, parse_toml, read_text
@@ -174,6 +175,18 @@ class Sweep(Table):
     def parameters(self) -> ModelParameters:
         """The table of parameters of the model."""
         return parameters_of(self.model, self._origin, self.network)
+
+    @property
+    def own_network(self) -> OwnMaker | None:
+        """A user's maker of networks, of a job with ``kind = "module:function"``."""
+        if self.network is None or ":" not in self.network.kind:
+            return None
+        return own_maker(self.network.kind, self._origin)
+
+    @property
+    def has_own_code(self) -> bool:
+        """Whether the model or the network is a user's, ``module:object``."""
+        return ":" in self.model or (self.network is not None and ":" in self.network.kind)
 
     @property
     def signals(self) -> str:
@@ -321,7 +334,7 @@ class Sweep(Table):
 
     @model_validator(mode="after")
     def _check_all(self, info: ValidationInfo) -> Self:
-        if ":" in self.model and info.context is not None:
+        if self.has_own_code and info.context is not None:
             self._origin = info.context
         model, axes = self.parameters, self.axes
         check_points(model, axes, self.fixed)

@@ -1,4 +1,4 @@
-"""A user's model, ``package.module:object``: which file it comes from, and its import.
+"""A user's object, ``package.module:object``: which file it comes from, and its import.
 
 The folders of `Origin` come first, then the current folder, then the Python path. If two of these
 places have different modules of the name, nothing is imported.
@@ -73,6 +73,14 @@ def user_model(name: str, origin: Origin | None = None) -> UserModel:
     return _loaded(name, () if origin is None else origin.folders, _current_folder())
 
 
+def user_object(key: str, name: str, origin: Origin | None = None) -> tuple[Any, Path | None]:
+    """Return the object that ``package.module:object`` names, and the file of its module.
+
+    Raises BadInput as `user_model` does for a module; `key` is the key of the job that names it.
+    """
+    return _imported(key, name, () if origin is None else origin.folders, _current_folder())
+
+
 def user_source(name: str, origin: Origin) -> SourceFiles | None:
     """Return the files of a user's model as they are now; None where there are none."""
     file = user_model(name, origin).file
@@ -87,22 +95,28 @@ def prints_to_stderr() -> Iterator[None]:
 
 
 @cache
-def _loaded(name: str, folders: tuple[str, ...], here: str) -> UserModel:
+def _imported(key: str, name: str, folders: tuple[str, ...], here: str) -> tuple[Any, Path | None]:
     module, _, attribute = name.partition(":")
-    where = f"model: {short(name)}"
+    where = f"{key}: {short(name)}"
     if not (_MODULE.fullmatch(module) and attribute.isidentifier()):
         raise BadInput(f"{where} is not of the form package.module:object")
     found = _find(where, module, tuple(filter(None, (*folders, here))))
-    kind = _attribute(where, module, attribute, found)
+    made = _attribute(where, module, attribute, found)
+    if found is not None:
+        _check_siblings(where, found)
+    return made, _file_of(module)
+
+
+@cache
+def _loaded(name: str, folders: tuple[str, ...], here: str) -> UserModel:
+    where = f"model: {short(name)}"
+    kind, file = _imported("model", name, folders, here)
     if not isinstance(getattr(kind, "parameters", None), ModelParameters):
         raise BadInput(f"{where} has no attribute parameters of type ModelParameters")
     if not callable(getattr(kind, "build", None)):
         raise BadInput(f"{where} has no method build(sweep, row)")
-    if found is not None:
-        _check_siblings(where, found)
     from chimera_hpc.models.held import held_values
 
-    file = _file_of(module)
     return UserModel(kind, file, held_values(kind, "" if file is None else str(file.parent)))
 
 

@@ -35,7 +35,8 @@ RING_PARAMETERS = ("P", "Q", "orientation", "flips", "flip_set")
 def network_of(sweep: Any, row: Numbers) -> Network:
     """Return the network of a point.
 
-    sweep: has ``model``, ``n_nodes`` and ``network``, the job's table [network] or None.
+    sweep: has ``model``, ``n_nodes`` and ``network``, the job's table [network] or None; and
+        ``own_network``, with ``names`` and ``make``, if the kind is a user's function.
     row: the parameters of the point by name, the seed among them.
     """
     table = sweep.network
@@ -44,10 +45,11 @@ def network_of(sweep: Any, row: Numbers) -> Network:
         if table is None:
             return ring
         return ring.with_triangles(_ring_cliques(ring.n_nodes, ring.half_degree))
-    names = NAMES[table.kind]
+    own = sweep.own_network if ":" in table.kind else None
+    names = NAMES[table.kind] if own is None else own.names
     numbers = tuple((name, row[name]) for name in names)
     seeds = int(row["network_seed"]), int(row["flips"])
-    return _made(table.kind, sweep.n_nodes, numbers, seeds, table.triangles, *_file(table))
+    return _made(table.kind, sweep.n_nodes, numbers, seeds, table.triangles, *_file(table), own)
 
 
 def pairs_of(sweep: Any, row: Numbers) -> Integers | None:
@@ -127,17 +129,22 @@ def _made(
     triangles: str,
     file: str,
     digest: str,
+    own: Any,
 ) -> Network:
     network_seed, flips = seeds
     key = {"kind": kind, "n_nodes": n_nodes, "network_seed": network_seed, **dict(numbers)}
     if kind == "file":
         key["file"] = digest
         network = _from_file(file, digest, n_nodes)
+    elif own is not None:
+        network = own.make(n_nodes, dict(numbers), network_stream(key))
     else:
         network = MAKERS[kind](n_nodes, dict(numbers), network_stream(key))
     if flips:
         network = network.reorient_random(flips, orientation_stream({**key, "flips": flips}))
-    return network if network.directed else network.with_triangles(triangles)
+    if network.directed or triangles == "given":
+        return network
+    return network.with_triangles(triangles)
 
 
 def _from_file(file: str, digest: str, n_nodes: int) -> Network:

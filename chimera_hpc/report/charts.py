@@ -166,6 +166,7 @@ def network(made: Sources, signals: str) -> figure:
     """
     plot = _figure(NETWORK, 400, match_aspect=True, tools="box_zoom,reset,save,pan,wheel_zoom")
     plot.x_range, plot.y_range = _range(-1.1, 1.1), _range(-1.1, 1.1)
+    plot.max_width = 480
     plot.axis.visible = plot.grid.visible = False
     plot.multi_line("xs", "ys", source=made["behind"], line_color="#c4c4c4", line_width=0.8)
     if signals == "nodes":

@@ -25,6 +25,7 @@ from chimera_hpc.run.initial_state import initial_state
 
 _PARTS = ("the real parameters p", "the integers", "the initial state", "the initial state")
 _RULE = "every random number must come from rng, the first argument of initial"
+_RULE_OF_NETWORKS = "every random number must come from the argument seed"
 
 
 def check_in_second_process(sweep: Sweep) -> None:
@@ -35,7 +36,7 @@ def check_in_second_process(sweep: Sweep) -> None:
     BadInput
         With what differs.
     """
-    if ":" not in sweep.model:
+    if not sweep.has_own_code:
         return
     rows = sorted({0, len(sweep.points()) - 1})
     here, there = drawn(sweep, rows), _drawn_elsewhere(sweep, rows)
@@ -45,9 +46,8 @@ def check_in_second_process(sweep: Sweep) -> None:
         other += [part for part, a, b in zip(_PARTS, one, two, strict=True) if a != b]
     if other:
         names = ", ".join(dict.fromkeys(other))
-        raise BadInput(
-            f"model: {short(sweep.model)}: not the same in another process: {names}; {_RULE}"
-        )
+        rule = _RULE if ":" in sweep.model else _RULE_OF_NETWORKS
+        raise BadInput(f"{_name(sweep)}: not the same in another process: {names}; {rule}")
 
 
 def drawn(sweep: Sweep, rows: Sequence[int]) -> dict[str, Any]:
@@ -58,7 +58,17 @@ def drawn(sweep: Sweep, rows: Sequence[int]) -> dict[str, Any]:
         model = build(sweep, row)
         parts = (model.lane_params, model.int_params, *initial_state(sweep, row, model))
         found.append([np.asarray(part).tobytes().hex() for part in parts])
-    return {"holds": user_model(sweep.model, sweep.origin).held, "points": found}
+    own = sweep.own_network
+    holds = dict(own.held) if own is not None else {}
+    if ":" in sweep.model:
+        holds |= user_model(sweep.model, sweep.origin).held
+    return {"holds": holds, "points": found}
+
+
+def _name(sweep: Sweep) -> str:
+    if ":" in sweep.model or sweep.network is None:
+        return f"model: {short(sweep.model)}"
+    return f"network.kind: {short(sweep.network.kind)}"
 
 
 def _drawn_elsewhere(sweep: Sweep, rows: Sequence[int]) -> dict[str, Any]:
@@ -75,9 +85,7 @@ def _drawn_elsewhere(sweep: Sweep, rows: Sequence[int]) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     except (ValueError, IndexError):
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        raise BadInput(
-            f"model: {short(sweep.model)} does not work in another process: {last}"
-        ) from None
+        raise BadInput(f"{_name(sweep)} does not work in another process: {last}") from None
     return found
 
 

@@ -1,4 +1,4 @@
-"""What a store knows of a user's model, so that it can be read without the module."""
+"""What a store knows of a user's model or network, so that it can be read without the module."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ def stored_origin(path: Path, root: Mapping[str, Any]) -> Origin:
     """
     try:
         attributes, nodes = root["attributes"], root["consolidated_metadata"]["metadata"]
-        if ":" not in attributes["spec"]["model"]:
+        spec = attributes["spec"]
+        if ":" not in spec["model"] and ":" not in spec.get("network", {}).get("kind", ""):
             return Origin()
         folders = [*filter(None, [attributes.get("model_folder")]), str(path.absolute().parent)]
-        return Origin(tuple(dict.fromkeys(folders)), _table(attributes["spec"], nodes))
+        return Origin(tuple(dict.fromkeys(folders)), _table(spec, nodes))
     except (KeyError, TypeError, AttributeError) as error:
         raise BadInput(f"{path}: the attributes are damaged: {error!r}") from None
 

@@ -22,7 +22,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.places import user_name
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.user_models import user_model, user_source
-from chimera_hpc.models.source import PACKAGE
+from chimera_hpc.models.source import PACKAGE, SourceFiles
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "zarr", "dask", "distributed", "scikit-learn")
 _SLURM = (
@@ -71,9 +71,9 @@ def gather(sweep: Sweep | None = None) -> dict[str, Any]:
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """Return a line for each thing that may change numbers and differs between two runs."""
     lines = []
-    for key in ("package", "source", "model", "python", "libraries"):
+    for key in ("package", "source", "model", "network", "python", "libraries"):
         lines += _lines(key, before.get(key), now.get(key))
-    for key in ("model_holds", "model_packages"):
+    for key in ("model_holds", "model_packages", "network_holds", "network_packages"):
         # Version 0.1 recorded neither.
         if key in before and key in now:
             lines += _lines(key, before[key], now[key])
@@ -123,24 +123,48 @@ def cpu_model() -> str:
 
 
 def model_source(sweep: Sweep | None) -> dict[str, Any]:
-    """Return what to record of a user's model; nothing of another one.
+    """Return what to record of a user's model and of a user's network; nothing of others.
 
     Keys: model (its name, and a digest of the files of its code), model_holds (the files of data
     that the code names, and the values that its functions hold, see `models.held`), model_packages
-    (the versions of what it imports). A model that cannot be imported has its name alone.
+    (the versions of what it imports). A model that cannot be imported has its name alone. network,
+    network_holds and network_packages tell the same of a function that makes networks.
     """
-    if sweep is None or ":" not in sweep.model:
+    if sweep is None:
+        return {}
+    return {**_model_source(sweep), **_network_source(sweep)}
+
+
+def _model_source(sweep: Sweep) -> dict[str, Any]:
+    if ":" not in sweep.model:
         return {}
     try:
         own, source = user_model(sweep.model, sweep.origin), user_source(sweep.model, sweep.origin)
     except BadInput:
         return {"model": f"{sweep.model}, which cannot be imported"}
+    return _source("model", sweep.model, source, own.held)
+
+
+def _network_source(sweep: Sweep) -> dict[str, Any]:
+    if sweep.network is None or ":" not in sweep.network.kind:
+        return {}
+    try:
+        own = sweep.own_network
+    except BadInput:
+        return {"network": f"{sweep.network.kind}, which cannot be imported"}
+    assert own is not None
+    return _source("network", own.kind, own.source, own.held)
+
+
+def _source(
+    key: str, name: str, source: SourceFiles | None, held: Mapping[str, str]
+) -> dict[str, Any]:
     if source is None:
-        return {"model": sweep.model, "model_holds": own.held}
+        return {key: name, f"{key}_holds": held}
     return {
-        "model": f"{sweep.model}, source {source.digest}",
-        "model_holds": {**source.data_digests(), **own.held},
-        "model_packages": source.versions(),
+        key: f"{name}, source {source.digest}",
+        f"{key}_holds": {**source.data_digests(), **held},
+        f"{key}_packages": source.versions(),
     }
 
 

@@ -164,7 +164,7 @@ class Store:
 
     def _with_model_of(self, sweep: Sweep) -> Self:
         """Return the store with a user's model as a job has it, from the job's folder first."""
-        if ":" not in sweep.model or sweep.model != self.sweep.model:
+        if not sweep.has_own_code or sweep.model != self.sweep.model:
             return self
         return self.open(self.path, sweep.origin.before(self.sweep.origin))
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from chimera_hpc.classify.classification import Classification
+from chimera_hpc.network.network import Network
 from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.report import content as contents
 from chimera_hpc.report import pictures, write_report
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import look_of
+from chimera_hpc.report.networks import drawing
 from chimera_hpc.report.page import MOST_FAILURES
 from chimera_hpc.report.pictures import Plates, evenly_spread, plates, representatives
 from chimera_hpc.report.tree_top import top_of
@@ -361,3 +363,18 @@ def test_a_class_name_cannot_break_out_of_the_pages_data(tmp_path, filled):
     assert sorted(look["name"] for look in looks)[:1] == [name]
     assert "alert(1)<" not in page
     assert "</title><b>" not in page
+
+
+def test_network_for_the_page_is_thinned_and_says_so():
+    ring = Network.ring(40, 2).with_triangles("cliques")
+    for signals, corners in (("nodes", 1), ("links", 2), ("triangles", 3)):
+        made = drawing(ring, signals, 10)
+        assert np.array(made["marks"]).shape == (10, corners)
+        assert len(made["behind"]) == (0 if signals == "links" else 80)
+        assert made["partly"] == f"10 of {ring.size(signals)} {signals}"
+        places = np.column_stack([made["x"], made["y"]])
+        assert np.abs(np.linalg.norm(places, axis=1) - 1.0).max() < 1e-2
+    first = drawing(Network.ring(5, 1), "links", 10)
+    sides = np.column_stack([first["x"], first["y"]])[first["marks"]]
+    np.testing.assert_allclose(sides[0], [[0.0, 1.0], [0.951, 0.309]])
+    assert first["partly"] == ""

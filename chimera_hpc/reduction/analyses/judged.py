@@ -99,7 +99,7 @@ def along_network(given: AnalysisInput) -> dict[str, Any]:
     """
     table = given.sweep.network
     assert table is not None
-    known = {p.name for p in kind_parameters(table.kind)} - {NETWORK_SEED.name}
+    known = {p.name for p in kind_parameters(table.kind, given.sweep.origin)} - {NETWORK_SEED.name}
     values = {n: len(np.unique(given.cells[n])) for n in given.points.axes if n in known}
     axis = max(values, key=lambda name: values[name], default=None)
     if axis is None or values[axis] < 2:
