@@ -66,7 +66,8 @@ class NetworkTable(Table):
         path = found_in(name, info.context)
         try:
             network, digest = read_file(path)
-            if (triangles := given.get("triangles", "none")) in ("none", "cliques"):
+            triangles = given.get("triangles", "none")
+            if triangles == "cliques" or (triangles == "none" and network.n_triangles):
                 network = network.with_triangles(triangles)
         except BadInput as error:
             raise BadInput(f"network.file: {error}") from None

@@ -39,7 +39,9 @@ class SimplicialKuramoto(PhaseModel):
 
     with :math:`\theta^- = B_k \theta` and :math:`\theta^+ = B_{k+1}^\top \theta`. See A. P. Millan,
     J. J. Torres, G. Bianconi, Phys. Rev. Lett. 124, 218301 (2020),
-    https://doi.org/10.1103/PhysRevLett.124.218301.
+    https://doi.org/10.1103/PhysRevLett.124.218301. The explosive variant is that of the code that
+    Bianconi published with it, https://github.com/ginestrab/Topological-and-Dirac-Synchronization:
+    R_+ of the higher simplices multiplies the term of the lower ones, and the other way round.
 
     Parameters
     ----------

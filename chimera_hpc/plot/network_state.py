@@ -182,7 +182,7 @@ class Drawing:
         carries = self.signals == "links"
         size = float(np.clip(20.0 / np.sqrt(max(1, len(self.chords))), 0.1, 0.9))
         width = 2.5 * size if carries else size
-        alpha = 1.0 if carries else float(np.clip(1500.0 / max(1, len(self.chords)), 0.15, 1.0))
+        alpha = 1.0 if carries else float(np.clip(400.0 / max(1, len(self.chords)), 0.1, 1.0))
         lines = LineCollection(list(self.chords), linewidths=width, alpha=alpha, zorder=2.0, **look)
         return _added(axes, lines, len(self.chords))
 
