@@ -184,4 +184,5 @@ def _scaled(places: NDArray[np.float64]) -> Array:
     """Move places into the square from -1 to 1; both axes keep one scale."""
     low, high = places.min(axis=0), places.max(axis=0)
     size = float((high - low).max()) or 1.0
-    return 2.0 * (places - 0.5 * (low + high)) / size
+    scaled: Array = 2.0 * (places - 0.5 * (low + high)) / size
+    return scaled

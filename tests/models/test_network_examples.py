@@ -43,7 +43,12 @@ def run(tmp_path: Path) -> Run:
 
 
 def test_populations_in_phase_turn_as_one(run: Run) -> None:
-    short = ("integrator.t_end=60", "features.start=40", "features.n_peaks=4")
+    short = (
+        "integrator.t_end=60",
+        "features.start=40",
+        "features.n_peaks=3",
+        "features.n_overlap=1",
+    )
     store = run("two_populations", "A=[0.2, 0.5]", "seeds=4", "n_nodes=16", *short)
     assert (store.ledger()["status"] == DONE).all()
     together = store.scalars()["R"] > 0.999
@@ -55,7 +60,12 @@ def test_populations_in_phase_turn_as_one(run: Run) -> None:
 
 
 def test_coupling_brings_the_karate_club_into_step(run: Run) -> None:
-    short = ("integrator.t_end=60", "features.start=40", "features.n_peaks=4")
+    short = (
+        "integrator.t_end=60",
+        "features.start=40",
+        "features.n_peaks=3",
+        "features.n_overlap=1",
+    )
     store = run("karate", "coupling=[0.02, 0.8]", "seeds=2", *short)
     order, strong = store.scalars()["R"], store.points.columns["coupling"] == 0.8
     assert order[strong].min() > 0.9 > 0.6 > order[~strong].max()
@@ -66,7 +76,13 @@ def test_coupling_brings_the_karate_club_into_step(run: Run) -> None:
 
 
 def test_brain_is_made_by_the_function_next_to_the_job(run: Run) -> None:
-    short = ("integrator.t_end=60", "features.start=30", "features.n_peaks=2", "n_nodes=24")
+    short = (
+        "integrator.t_end=60",
+        "features.start=30",
+        "features.n_peaks=3",
+        "features.n_overlap=1",
+        "n_nodes=24",
+    )
     store = run("brain", "reach=[0.2, 0.4]", "network_seed=1", "seeds=2", *short)
     network = network_of(store.sweep, store.points.row(0))
     assert network.n_components == 1
@@ -77,7 +93,13 @@ def test_brain_is_made_by_the_function_next_to_the_job(run: Run) -> None:
 
 
 def test_links_carry_u_and_have_their_pictures(run: Run) -> None:
-    short = ("integrator.t_end=60", "features.start=30", "features.n_peaks=2", "n_nodes=12")
+    short = (
+        "integrator.t_end=60",
+        "features.start=30",
+        "features.n_peaks=3",
+        "features.n_overlap=1",
+        "n_nodes=12",
+    )
     settings = ("mean_degree=[4.0, 6.0]", "network_seed=1", "seeds=2", *short)
     store = run("links", *settings, figures='["network_state", "space_time"]')
     assert store.sizes.tolist() == [24, 24, 36, 36]
@@ -95,7 +117,13 @@ def test_links_carry_u_and_have_their_pictures(run: Run) -> None:
 
 
 def test_hubs_lose_their_amplitude_first(run: Run) -> None:
-    short = ("integrator.t_end=60", "features.start=40", "features.n_peaks=4", "n_nodes=40")
+    short = (
+        "integrator.t_end=60",
+        "features.start=40",
+        "features.n_peaks=3",
+        "features.n_overlap=1",
+        "n_nodes=40",
+    )
     store = run("scale_free", "coupling=[0.2]", "m=[2]", "network_seed=1", "seeds=2", *short)
     network = network_of(store.sweep, store.points.row(0))
     degree = np.bincount(network.links.ravel(), minlength=40)
