@@ -1,8 +1,8 @@
 """A user's maker of networks, ``kind = "module:function"`` in [network].
 
 The function has typed parameters, ``hub(n_nodes: int, spokes: int = 3, seed=0)``, and returns a
-`Network`. ``n_nodes`` and ``seed``, where it has them, come from the sweep; all others are parameters
-of the job.
+`Network`. ``n_nodes`` and ``seed``, where it has them, come from the sweep; all others are
+parameters of the job.
 """
 
 from __future__ import annotations

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from chimera_hpc import Network, TopologicalFHN
-from chimera_hpc.integrate.lanes import Control, integrate
+from chimera_hpc.integrate.lanes import Control, Outcome, integrate
 from chimera_hpc.integrate.simd import LANES
 
 SIZES = (1_000, 10_000, 100_000)
@@ -33,9 +34,13 @@ def measured() -> Iterator[tuple[Network, int, float]]:
         seconds = []
         for _ in range(REPEATS):
             begin = time.process_time()
-            integrate([model] * LANES, states, control, 1, lambda _, end: steps.append(end.steps))
+            integrate([model] * LANES, states, control, 1, partial(_note, steps))
             seconds.append(time.process_time() - begin)
         yield network, max(steps), min(seconds)
+
+
+def _note(steps: list[int], _: int, end: Outcome) -> None:
+    steps.append(end.steps)
 
 
 def main() -> None:

@@ -150,6 +150,9 @@ pairs = "ring"
 [grid]
 P = [9, 12, 21]
 seeds = 3
+[reduction]
+cuts = [3]
+names = ["ordered", "chimera", "disordered"]
 """
 
 
@@ -187,7 +190,7 @@ def test_ring_given_as_edge_lists_has_the_classes_of_the_ring(tmp_path: Path) ->
     (tmp_path / "ring_of_files.py").write_text(RING_OF_FILES)
     (tmp_path / "rings.toml").write_text(RING_JOB)
     words = ["--out", str(tmp_path / "out"), "--cluster", "serial", "--no-figures"]
-    assert main(["run", str(tmp_path / "rings.toml"), *words, "--set", "reduction.cuts=[3]"]) == 0
+    assert main(["run", str(tmp_path / "rings.toml"), *words]) == 0
     cells = json.loads((tmp_path / "out" / "results.json").read_text())["cuts"]["3"]["cells"]
     # Those of the quick start.
     assert [cell["class"] for cell in cells] == ["ordered", "chimera", "disordered"]

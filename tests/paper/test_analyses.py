@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -169,6 +171,8 @@ def test_robustness_on_networks_goes_along_the_parameter_with_most_values() -> N
     figure = robustness_figure(FigureInput(runs.classification, runs.triplets, [], {}, curves={
         "robustness": made}))  # fmt: skip
     assert figure.axes[0].get_xlabel() == r"$\mathrm{rewire}$"
+    own = load(ANALYSES["robustness"])(replace(runs, atlases={}))
+    assert own["judge"] == "own classes"
     with pytest.raises(BadInput, match='no parameter of the network "small_world" varies'):
         load(ANALYSES["robustness"])(given({"P": 2}, [DONE], network={"kind": "small_world"}))
 

@@ -88,14 +88,15 @@ def robustness(given: AnalysisInput) -> dict[str, Any]:
         "orientation": row["orientation"],
         "Q": row["Q"],
         "label": _label(given),
-        "by": _curves(given, "flips", np.ones(len(given.cell), dtype=np.bool_)),
+        "by": _curves(given, "flips", np.ones(len(given.cell), dtype=np.bool_), "chimera"),
     }
 
 
 def along_network(given: AnalysisInput) -> dict[str, Any]:
     """W against the parameter of the network that has most values, for each value of other axes.
 
-    The judges are the atlases, or the sweep's own classes where there are none.
+    The judges are the atlases, or the sweep's own classes where there are none. If none of these is
+    called chimera, there is a curve for each class.
     """
     table = given.sweep.network
     assert table is not None
@@ -107,26 +108,49 @@ def along_network(given: AnalysisInput) -> dict[str, Any]:
     others = free_axes(given.cells, [n for n in given.points.axes if n not in _NO_CURVES | {axis}])
     keys = np.stack([np.zeros(given.n_cells), *(each.values for each in others)])
     _, first, group = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+    named = _classes(given)
     curves = [
         {
-            "label": describe(given.place(int(cell)), others, math=True) or table.kind,
-            "plain": describe(given.place(int(cell)), others) or table.kind,
-            "by": _curves(given, axis, group.ravel()[given.cell] == number),
+            "label": _place_and_class(describe(place, others, math=True), name, named),
+            "plain": _place_and_class(describe(place, others), name, named),
+            "class": name,
+            "by": _curves(given, axis, group.ravel()[given.cell] == number, name),
         }
-        for number, cell in enumerate(first.tolist())
+        for number, place in enumerate(map(given.place, first.tolist()))
+        for name in named
     ]
     symbol = FreeAxis((axis,), given.cells[axis]).symbol
     judge = next(iter(given.atlases), _OWN)
     return {"judge": judge, "axis": axis, "symbol": symbol, "curves": curves}
 
 
-def _curves(given: AnalysisInput, axis: str, among: NDArray[np.bool_]) -> dict[str, dict[str, Any]]:
-    """Return W of some runs (n,) against a parameter, by each judge."""
-    x, counted = given.points.columns[axis][among], given.has_result[among]
+def _judges(given: AnalysisInput) -> dict[str, list[str | None]]:
+    """Return the class of each run by each atlas, or by the sweep's own classes without one."""
     judges = {name: given.judged_names(judge) for name, judge in given.atlases.items()}
+    return judges or {_OWN: given.own_names()}
+
+
+def _classes(given: AnalysisInput) -> list[str]:
+    """Return the classes that have a curve: chimera, or all if none is called so."""
+    found = {str(name) for names in _judges(given).values() for name in names if name}
+    if given.atlases or any(_is([name], "chimera")[0] for name in found):
+        return ["chimera"]
+    return sorted(found - {STEADY, NO_WINDOW})
+
+
+def _place_and_class(place: str, name: str, named: Sequence[str]) -> str:
+    parts = [place, name if len(named) > 1 or not place else ""]
+    return ", ".join(filter(None, parts))
+
+
+def _curves(
+    given: AnalysisInput, axis: str, among: NDArray[np.bool_], wanted: str
+) -> dict[str, dict[str, Any]]:
+    """Return the share of a class of some runs (n,) against a parameter, by each judge."""
+    x, counted = given.points.columns[axis][among], given.has_result[among]
     curves = {}
-    for name, verdicts in (judges or {_OWN: given.own_names()}).items():
-        curve = fraction_curve(x, _is(verdicts, "chimera")[among], counted)
+    for name, verdicts in _judges(given).items():
+        curve = fraction_curve(x, _is(verdicts, wanted)[among], counted)
         others = {
             other: fraction_curve(x, _is(verdicts, other)[among], counted).fraction
             for other in ("ordered", "disordered", STEADY)
