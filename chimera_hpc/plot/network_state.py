@@ -73,8 +73,8 @@ def network_states(states: Sequence[NetworkState], layout: str | ArrayLike = "au
     """
     rows = len(states)
     figure = style.new_figure(style.PAGE, 0.7 + 2.0 * rows)
-    shape = {"height_ratios": [1.0] * rows + [0.05], "squeeze": False}
-    *axes, bars = figure.subplots(rows + 1, 1 + len(_COLUMNS), **shape)
+    heights = [1.0] * rows + [0.05]
+    *axes, bars = figure.subplots(rows + 1, 1 + len(_COLUMNS), height_ratios=heights, squeeze=False)
     scales = [_scale(states, name) for name, _, _ in _COLUMNS]
     for row, state in zip(axes, states, strict=True):
         drawing = Drawing(state.network, state.signals, node_places(state.network, layout))
@@ -217,7 +217,8 @@ class Drawing:
 def _feature(state: NetworkState, name: str) -> Array | None:
     if state.features is None:
         return None
-    return np.asarray(state.features, dtype=np.float64)[FEATURES.index(name)]
+    values: Array = np.asarray(state.features, dtype=np.float64)[FEATURES.index(name)]
+    return values
 
 
 def _scale(states: Sequence[NetworkState], name: str) -> Normalize:

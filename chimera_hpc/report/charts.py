@@ -169,14 +169,16 @@ def network(made: Sources, signals: str) -> figure:
     plot.max_width = 480
     plot.axis.visible = plot.grid.visible = False
     plot.multi_line("xs", "ys", source=made["behind"], line_color="#c4c4c4", line_width=0.8)
-    if signals == "nodes":
-        look = {"size": 9, "fill_color": "colour", "line_color": _INK, "line_width": 0.5}
-        marks = plot.scatter("xs", "ys", source=made["marks"], **look)
-    elif signals == "links":
-        marks = plot.multi_line("xs", "ys", source=made["marks"], line_color="colour", line_width=3)
-    else:
-        look = {"fill_color": "colour", "fill_alpha": 0.55, "line_color": None}
-        marks = plot.patches("xs", "ys", source=made["marks"], **look)
+    draw: Any  # bokeh types each of its many keywords
+    draw, look = {
+        "nodes": (plot.scatter, {"size": 9, "fill_color": "colour", "line_color": _INK}),
+        "links": (plot.multi_line, {"line_color": "colour", "line_width": 3}),
+        "triangles": (
+            plot.patches,
+            {"fill_color": "colour", "fill_alpha": 0.55, "line_color": None},
+        ),
+    }[signals]
+    marks = draw("xs", "ys", source=made["marks"], **look)
     word = signals.removesuffix("s")
     plot.add_tools(HoverTool(renderers=[marks], tooltips=[(word, "@number"), ("", "@value")]))
     return plot

@@ -172,7 +172,7 @@ def _robustness(content: Content) -> dict[str, Mapping[str, Any]]:
     """Return the curves W of this sweep and of those it is drawn with, by their labels."""
     beside = content.store.sweep.reduction.beside
     others = curves_beside(content.folder, beside, lambda line: None)
-    found = {}
+    found: dict[str, Mapping[str, Any]] = {}
     for curves in (content.results.get("curves", {}), *others.values()):
         entry = curves.get("robustness")
         for each in entry.get("curves", [entry]) if entry else ():
