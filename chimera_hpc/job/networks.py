@@ -147,8 +147,8 @@ def observed_sizes(sweep: Sweep, columns: Mapping[str, Column]) -> NDArray[np.in
 
 def distinct(sweep: Sweep) -> list[str]:
     """Return the names of the parameters in which the networks of a sweep differ."""
-    assert sweep.network is not None
-    return [p.name for p in kind_parameters(sweep.network.kind, sweep.origin)]
+    kind = RING if sweep.network is None else sweep.network.kind
+    return [p.name for p in kind_parameters(kind, sweep.origin)]
 
 
 def groups_of(

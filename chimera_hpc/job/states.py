@@ -16,7 +16,6 @@ from chimera_hpc.job.models import build
 from chimera_hpc.job.networks import distinct, groups_of
 from chimera_hpc.job.registry import measures
 from chimera_hpc.models.parameters import Column
-from chimera_hpc.network.sweep_network import RING
 
 if TYPE_CHECKING:
     from chimera_hpc.job.spec import Sweep
@@ -27,8 +26,7 @@ def state_sizes(sweep: Sweep, columns: Mapping[str, Column]) -> NDArray[np.int64
 
     One model is built for each network.
     """
-    kind = RING if sweep.network is None else sweep.network.kind
-    names = [name for name in distinct(kind) if name in columns]
+    names = [name for name in distinct(sweep) if name in columns]
     first, of_point = [0], np.zeros(len(columns["seed"]), dtype=np.int64)
     if names:
         first, of_point = groups_of(columns, names)
