@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import sys
 from collections.abc import Callable
@@ -11,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chimera_hpc import Network, simulate
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.models import try_networks
 from chimera_hpc.network.sweep_network import network_of
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "jobs" / "examples"
-DONE = 1
 Run = Callable[..., Store]
 
 
@@ -42,21 +41,11 @@ def run(tmp_path: Path) -> Run:
     return made
 
 
-def test_populations_in_phase_turn_as_one(run: Run) -> None:
-    short = (
-        "integrator.t_end=60",
-        "features.start=40",
-        "features.n_peaks=3",
-        "features.n_overlap=1",
-    )
-    store = run("two_populations", "A=[0.2, 0.5]", "seeds=4", "n_nodes=16", *short)
-    assert (store.ledger()["status"] == DONE).all()
-    together = store.scalars()["R"] > 0.999
-    frequency = store.features()[:, 1]
-    assert frequency[together] == pytest.approx(
-        np.full((together.sum(), 16), (8.0 - math.cos(0.1)) / (2.0 * math.pi)), rel=1e-3
-    )
-    assert {"chi", "lambda"} <= set(store.scalars())
+@pytest.mark.parametrize("name", ["two_populations", "karate", "brain", "links", "scale_free"])
+def test_networks_of_the_example_can_be_made(name: str) -> None:
+    sweep = Sweep.load(EXAMPLES / f"{name}.toml")
+    try_networks(sweep)
+    assert len(sweep.points()) <= 100
 
 
 def test_coupling_brings_the_karate_club_into_step(run: Run) -> None:
@@ -114,21 +103,6 @@ def test_links_carry_u_and_have_their_pictures(run: Run) -> None:
     assert "links, by community" in page
     assert main(["show", str(folder), "mean_degree=4", "seed=0", "--layout", "circular"]) == 0
     assert len(list((folder / "figures" / "show").glob("*-network.png"))) == 1
-
-
-def test_hubs_lose_their_amplitude_first(run: Run) -> None:
-    short = (
-        "integrator.t_end=60",
-        "features.start=40",
-        "features.n_peaks=3",
-        "features.n_overlap=1",
-        "n_nodes=40",
-    )
-    store = run("scale_free", "coupling=[0.2]", "m=[2]", "network_seed=1", "seeds=2", *short)
-    network = network_of(store.sweep, store.points.row(0))
-    degree = np.bincount(network.links.ravel(), minlength=40)
-    amplitude: NDArray[np.float64] = store.features()[:, 0].mean(axis=0)
-    assert amplitude[degree.argmax()] < 0.8 * amplitude[degree == 2].mean()
 
 
 RING_OF_FILES = """
