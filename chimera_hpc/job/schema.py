@@ -92,7 +92,11 @@ def _only_for(name: str, model: ModelParameters, table: str = "") -> dict[str, A
         },
     }
     named = {"properties": {"model": {"const": name}}, "required": ["model"]}
-    there = {"required": [table]} if table else {"not": {"required": ["network"]}}
+    # A network of the user's own has parameters that are not known here.
+    shipped = {"network": {"properties": {"kind": {"not": {"pattern": ":"}}}}}
+    there: dict[str, Any] = {"required": [table], "properties": shipped}
+    if not table:
+        there = {"not": {"required": ["network"]}}
     return {"if": {"allOf": [named, there]}, "then": {"properties": allowed}}
 
 
