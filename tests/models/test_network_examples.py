@@ -41,7 +41,7 @@ def run(tmp_path: Path) -> Run:
     return made
 
 
-@pytest.mark.parametrize("name", ["two_populations", "karate", "brain", "links", "scale_free"])
+@pytest.mark.parametrize("name", ["populations", "karate", "brain", "links", "scale_free"])
 def test_networks_of_the_example_can_be_made(name: str) -> None:
     sweep = Sweep.load(EXAMPLES / f"{name}.toml")
     try_networks(sweep)
