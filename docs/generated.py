@@ -80,7 +80,13 @@ def _parameters(parameters: Iterable[Parameter]) -> str:
     return _table(("key", "value", "default", "meaning"), rows)
 
 
-_WORDS = {"integer": "integer", "number": "number", "string": "text", "boolean": "true or false"}
+_WORDS = {
+    "integer": "integer",
+    "number": "number",
+    "string": "text",
+    "boolean": "true or false",
+    "object": "table",
+}
 _BOUNDS = {
     "minimum": "from {}",
     "exclusiveMinimum": "above {}",
