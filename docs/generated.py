@@ -111,7 +111,7 @@ def _allowed(entry: Mapping[str, Any]) -> str:
     if entry.get("type") == "array":
         return f"list of {_allowed(entry['items'])}"
     if entry.get("pattern") == ":":
-        return f"`{entry['description']}`"
+        return f"`{entry.get('description', 'package.module:object')}`"
     bounds = [text.format(f"{entry[key]:g}") for key, text in _BOUNDS.items() if key in entry]
     return " ".join([_WORDS[entry["type"]], *bounds])
 
