@@ -34,7 +34,9 @@ class NetworkTable(Table):
         RING,
         description="Kind of network, or your own function module:function; its parameters are "
         "axes or fixed, like those of the model.",
-        json_schema_extra={"anyOf": [{"enum": list(KINDS)}, {"pattern": ":"}]},
+        json_schema_extra={
+            "anyOf": [{"enum": list(KINDS)}, {"pattern": ":", "description": "module:function"}]
+        },
     )
     file: Line | None = Field(
         None,
