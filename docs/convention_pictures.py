@@ -24,6 +24,7 @@ CHIMERA, WAVE = (12, 0), (7, 0)
 OWN = {"window_reference": "own", "max_windows": 4, "prominence": 0.1}
 SHOWN = 14.0
 """Length of the drawn part of the analysis interval, in units of time."""
+WINDOWS = ((0, "o", BLUE, "first window"), (2, "x", ORANGE, "third window"))
 IMAGES = Path(__file__).resolve().parent / "images"
 
 
@@ -52,7 +53,7 @@ def draw_windows(t: Any, u: Any) -> Any:
         axis.set_ylabel(f"u of node {node}")
         axis.set_ylim(-2.4, 4.7)
         axis.set_yticks([-2, 0, 2])
-    axes[0].legend(loc="lower right", ncols=2, framealpha=1.0)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     axes[0].set_xlim(t[0], t[0] + SHOWN)
     axes[1].set_xlabel("time")
     return figure
@@ -69,8 +70,8 @@ def draw_origin(t: Any, u: Any) -> Any:
     figure, axes = pyplot.subplots(1, 4, figsize=(11, 3.2), sharey=True, layout="constrained")
     for axis, (title, options) in zip(axes, cases, strict=True):
         found = window_lines(t, u, **options)
-        for w, colour, name in ((0, BLUE, "first window"), (2, ORANGE, "third window")):
-            axis.plot(found.phase[:, w] / np.pi, ".", color=colour, label=name, markersize=4)
+        for w, style, colour, name in WINDOWS:
+            axis.plot(found.phase[:, w] / np.pi, style, color=colour, label=name, mfc="none", ms=5)
         axis.set_title(title, fontsize="medium")
         axis.set_xlabel("node")
     axes[0].set_ylabel(r"phase / $\pi$")
@@ -83,7 +84,7 @@ def draw_means(t: Any, u: Any) -> Any:
     figure, axes = pyplot.subplots(1, 3, figsize=(11, 3.2), sharey=True, layout="constrained")
     lines = window_lines(t, u, **OWN, time_origin="recording", refine="sine-fit")
     for w, phase in enumerate(lines.phase.T):
-        axes[0].plot(phase / np.pi, ".", markersize=4, label=f"window {w}")
+        axes[0].plot(phase / np.pi, "o^sx"[w], mfc="none", ms=5, label=f"window {w}")
     axes[0].set_title("in each window", fontsize="medium")
     axes[0].set_ylabel(r"phase / $\pi$")
     axes[0].legend(loc="upper right", fontsize="small")
