@@ -97,7 +97,10 @@ def reduce_sweep(
     """
     folder = Path(folder)
     store = Store.open(folder / STORE_NAME)
-    for convention in reversed(conventions(store.sweep)):
+    found = conventions(store.sweep)
+    for convention in reversed(found):
+        if len(found) > 1:
+            say(f"convention {convention or 'of the job'}:")
         work = _Work(folder, store, say, convention)
         work.classify(curves, claims)
         figures = work.draw() if make_figures and work.unwritten is None else ()
@@ -326,8 +329,6 @@ class _Work:
         return {int(k): np.array(shares, dtype=np.float64) for k, shares in found.items()}
 
     def tell(self, figures: Sequence[Path]) -> None:
-        if self.convention != OWN:
-            self._say(f"convention {self.convention}:")
         for line in self.table.splitlines():
             self._say(line)
         for line in decided_lines(self.decided, self.axes):

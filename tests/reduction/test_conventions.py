@@ -18,6 +18,7 @@ from chimera_hpc.measures.variation import total_variations
 from chimera_hpc.recordings.judge import Judge
 from chimera_hpc.reduction.audit import Sample, audit_sweep
 from chimera_hpc.reduction.conventions import conventions, stored_reduction
+from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
@@ -64,6 +65,15 @@ def test_all_runs_are_clustered_under_it_and_the_first_results_stay(
     assert first["clustering"]["clustered_points"] == first["points"]["done"] < 20
     alone = results(run(tmp_path / "b"))
     assert {key: first[key] for key in alone} == alone
+
+
+def test_every_line_stands_below_the_name_of_its_convention(both: Path) -> None:
+    lines: list[str] = []
+    reduce_sweep(both, make_figures=False, say=lines.append)
+    second = lines.index("convention of the job:")
+    assert lines[0] == "convention paper-printed:"
+    assert sum("points run" in line for line in lines[:second]) == 1
+    assert sum("points run" in line for line in lines[second:]) == 1
 
 
 def test_a_job_with_the_preset_has_the_classes_of_the_second_convention(
