@@ -116,7 +116,7 @@ def plates(
     return Plates(
         *(made, int((chosen >= 0).sum()), images, most_cells, replay),
         networks=networks.drawn,
-        ordered=networks.ordered(chosen[pictured[:1]].tolist()),
+        ordered=networks.ordered(chosen[spread[:1]].tolist()),
     )
 
 
