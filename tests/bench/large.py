@@ -25,7 +25,7 @@ REPEATS = 5
 def measured() -> Iterator[tuple[Network, int, float]]:
     """Yield networks, steps of a trajectory, and the least seconds of `REPEATS` for all of them."""
     rng = np.random.default_rng(0)
-    control = Control(2.0, 2.0, 2.0, 1e-6, 1e-9)
+    control = Control(0.1, 0.1, 0.1, 1e-6, 1e-9)
     for n in SIZES:
         network = Network.scale_free(n, LINKS_EACH, seed=1)
         model = TopologicalFHN(network, 0.05, 0.5, -0.01)
