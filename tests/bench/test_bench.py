@@ -26,6 +26,7 @@ def bench(monkeypatch: pytest.MonkeyPatch):
     return importlib.import_module
 
 
+@pytest.mark.timeout(900)
 @pytest.mark.slow
 def test_every_part_runs_and_leaves_a_page(tmp_path):
     (tmp_path / "images").mkdir()

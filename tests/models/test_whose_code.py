@@ -100,6 +100,7 @@ def run(cwd: Path, *words: object) -> subprocess.CompletedProcess[str]:
 
 def edited() -> None:
     """Forget the model, as a new process would."""
+    user_models._imported.cache_clear()
     user_models._loaded.cache_clear()
     for name in [name for name in sys.modules if name.startswith("mine_")]:
         del sys.modules[name]
