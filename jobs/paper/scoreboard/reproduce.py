@@ -96,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if found["reproduced"] is False:
                 print(f"  not reproduced: {row['id']}: {found['measured']}")
     print(f"scoreboard  {folder / 'claims.md'}, {folder / 'results.json'}")
-    print(f"{spent['minutes']:.1f} minutes, {spent['cpu_minutes']:.1f} of processor time")
+    print(f"{spent['minutes']:.1f} minutes")
     for name in failed:
         print(f"failed: {name}, exit status {times[name][0]}; see {folder / name}.log")
     return 1 if failed else 0
@@ -202,7 +202,8 @@ def _run(
 def cost(seconds: float) -> dict[str, float]:
     """Return what this call has used so far: wall and processor time, and how busy the machine is.
 
-    Processor time is that of this process and of those it has waited for.
+    Processor time is that of this process and of those it has waited for, without the workers that
+    a fork server started.
     """
     used = [resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return {
@@ -241,8 +242,8 @@ def _cost_line(spent: dict[str, float]) -> list[str]:
         return []
     return [
         f"The last call that ran jobs ran {spent['jobs']} in {spent['minutes']:.0f} minutes of "
-        f"wall time and {spent['cpu_minutes']:.0f} of processor time, on {spent['processors']} "
-        f"processors that {spent['load']:.1f} processes wanted at the end (mean of 15 minutes).\n"
+        f"wall time, on {spent['processors']} processors that {spent['load']:.1f} processes wanted "
+        f"at the end (mean of 15 minutes).\n"
     ]
 
 
