@@ -4,7 +4,7 @@ The public names are loaded when they are first used (PEP 562), so that ``import
 milliseconds: the kernels compile, and scikit-learn alone takes seconds.
 """
 
-from importlib import import_module
+from chimera_hpc.base.public import load_on_use
 
 # Not from typing: the current folder, which may hold a typing.py, may come first on the path yet.
 TYPE_CHECKING = False
@@ -71,15 +71,4 @@ _EXPORTS = {
     "total_variations": ("chimera_hpc.measures.variation", "total_variations"),
 }
 
-
-def __getattr__(name: str) -> object:
-    if name not in _EXPORTS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, attribute = _EXPORTS[name]
-    value: object = getattr(import_module(module), attribute)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = load_on_use(__name__, _EXPORTS)

@@ -18,7 +18,7 @@ Runs = Annotated[int, Field(ge=1, le=10**6)]
 
 
 class Decide(Table):
-    """How many runs a cell gets, and which cells are added; `grid.seeds` is `first`."""
+    """The number of runs per cell, and the cells to add. `grid.seeds` equals `first`."""
 
     confidence: float = Field(
         0.95,

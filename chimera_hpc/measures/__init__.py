@@ -3,7 +3,7 @@
 The functions are loaded when they are first used, because most of them load kernels.
 """
 
-from importlib import import_module
+from chimera_hpc.base.public import load_on_use
 
 TYPE_CHECKING = False
 
@@ -68,15 +68,7 @@ __all__ = [
     "wavelet_features",
 ]
 
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module(f"{__name__}.{_HOMES[name]}")
-    value: object = getattr(module, _OTHER_NAMES.get(name, name))
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = load_on_use(
+    __name__,
+    {name: (f"{__name__}.{home}", _OTHER_NAMES.get(name, name)) for name, home in _HOMES.items()},
+)

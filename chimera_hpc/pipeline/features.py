@@ -17,24 +17,12 @@ Array = NDArray[np.float64]
 PROFILES = ("phase", "amplitude", "frequency")
 
 
-class RunTransformer(TransformerMixin, BaseEstimator):  # type: ignore[misc, unused-ignore]
-    """A transformer that takes each run for itself and has nothing to learn."""
-
-    step: float
+class Stateless(TransformerMixin, BaseEstimator):  # type: ignore[misc, unused-ignore]
+    """A transformer of runs, or of what was measured of them, that has nothing to learn."""
 
     def fit(self, X: Any, y: Any = None) -> Self:
         """Do nothing: each run is measured for itself."""
         return self
-
-    def transform(self, X: Any) -> Any:
-        """Return an array with a row per run, or a list where rows differ in length."""
-        rows = [self.measure(run) for run in signal_runs(X, self.step)]
-        same = len({np.shape(row) for row in rows}) <= 1
-        return np.array(rows) if same else rows
-
-    def measure(self, run: SignalRun) -> ArrayLike:
-        """Return the numbers of one run."""
-        raise NotImplementedError
 
     def __sklearn_is_fitted__(self) -> bool:
         return True
@@ -45,6 +33,22 @@ class RunTransformer(TransformerMixin, BaseEstimator):  # type: ignore[misc, unu
         tags.input_tags.two_d_array, tags.input_tags.three_d_array = False, True
         tags.input_tags.allow_nan = True
         return tags
+
+
+class RunTransformer(Stateless):
+    """A transformer that takes each run for itself."""
+
+    step: float
+
+    def transform(self, X: Any) -> Any:
+        """Return an array with a row per run, or a list where rows differ in length."""
+        rows = [self.measure(run) for run in signal_runs(X, self.step)]
+        same = len({np.shape(row) for row in rows}) <= 1
+        return np.array(rows) if same else rows
+
+    def measure(self, run: SignalRun) -> ArrayLike:
+        """Return the numbers of one run."""
+        raise NotImplementedError
 
 
 class FourierFeatures(RunTransformer):

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import hilbert
-from sklearn.base import BaseEstimator, TransformerMixin
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.classify.classification import TRIPLET
 from chimera_hpc.job.registry import MEASURES, OTHER_NAMES, measures
 from chimera_hpc.job.selection import check_name
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.fourier import measure_signals
 from chimera_hpc.measures.measure import MeasuredRun
 from chimera_hpc.measures.variation import total_variation_arrays
-from chimera_hpc.pipeline.features import PROFILES, RunTransformer
+from chimera_hpc.pipeline.features import PROFILES, RunTransformer, Stateless
 from chimera_hpc.pipeline.runs import SignalRun
 
-TRIPLET = ("V_theta", "V_a", "V_Omega")
 
-
-class TotalVariation(TransformerMixin, BaseEstimator):  # type: ignore[misc, unused-ignore]
+class TotalVariation(Stateless):
     """Total variations (V_theta, V_a, V_Omega) of profiles, as `chimera_hpc.total_variations`.
 
     X is what `FourierFeatures` gives, profiles (runs, 3, nodes); the result is an array (runs, 3),
@@ -44,10 +42,6 @@ class TotalVariation(TransformerMixin, BaseEstimator):  # type: ignore[misc, unu
     def __init__(self, pairs: str | ArrayLike = "ring") -> None:
         self.pairs = pairs
 
-    def fit(self, X: Any, y: Any = None) -> Self:
-        """Do nothing: each run is measured for itself."""
-        return self
-
     def transform(self, X: Any) -> NDArray[np.float64]:
         """Return the triplets of runs, (runs, 3)."""
         where = _pairs(self.pairs)
@@ -57,16 +51,6 @@ class TotalVariation(TransformerMixin, BaseEstimator):  # type: ignore[misc, unu
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
         """Return the names of the columns."""
         return np.array(TRIPLET, dtype=object)
-
-    def __sklearn_is_fitted__(self) -> bool:
-        return True
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.requires_fit = False
-        tags.input_tags.two_d_array, tags.input_tags.three_d_array = False, True
-        tags.input_tags.allow_nan = True
-        return tags
 
 
 def _pairs(pairs: str | ArrayLike) -> dict[str, Any]:

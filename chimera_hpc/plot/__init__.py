@@ -3,7 +3,7 @@
 `space_time`, `profiles`, `variations` and `classes` take the dataset that `chimera_hpc.open` gives.
 """
 
-from importlib import import_module
+from chimera_hpc.base.public import load_on_use
 
 TYPE_CHECKING = False
 
@@ -12,14 +12,6 @@ if TYPE_CHECKING:
 
 __all__ = ["classes", "profiles", "space_time", "variations"]
 
-
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value: object = getattr(import_module(f"{__name__}.of_data"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = load_on_use(
+    __name__, {name: (f"{__name__}.of_data", name) for name in __all__}
+)

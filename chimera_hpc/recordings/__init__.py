@@ -1,6 +1,6 @@
 """Other people's time series: read, prepared, measured, judged or clustered."""
 
-from importlib import import_module
+from chimera_hpc.base.public import load_on_use
 
 TYPE_CHECKING = False
 
@@ -38,14 +38,6 @@ __all__ = [
     "with_times",
 ]
 
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value: object = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = load_on_use(
+    __name__, {name: (f"{__name__}.{home}", name) for name, home in _HOMES.items()}
+)

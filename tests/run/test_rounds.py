@@ -1,4 +1,4 @@
-"""Rounds of a sweep with [decide]: a pure function of the store, whoever asks and is killed."""
+"""Rounds of a sweep with [decide]: a pure function of the store, in any process."""
 
 from __future__ import annotations
 
