@@ -93,14 +93,20 @@ def _chain(network: Network) -> Integers:
 
 def ring_of(sweep: Any, row: Numbers) -> Network:
     """Return the ring of a point, with its orientation and the links that are reversed."""
-    ring = Network.ring(sweep.n_nodes, int(row["P"]), int(row.get("orientation", 1)))
-    ring = ring.reorient_node(0, int(row.get("Q", 0)))
+    orientation, reoriented = int(row.get("orientation", 1)), int(row.get("Q", 0))
+    ring = _oriented_ring(sweep.n_nodes, int(row["P"]), orientation, reoriented)
     flips = int(row.get("flips", 0))
     if not flips:
         return ring
     stream = topology_stream(*stream_key(sweep.model, sweep.n_nodes, row), flips)
     among = ring.links_at(0) if int(row["flip_set"]) == 1 else None
     return ring.reorient_random(flips, stream, among)
+
+
+@lru_cache(maxsize=4)
+def _oriented_ring(n_nodes: int, half_degree: int, orientation: int, reoriented: int) -> Network:
+    """The ring of a cell: its runs share one, with the matrices that it keeps."""
+    return Network.ring(n_nodes, half_degree, orientation).reorient_node(0, reoriented)
 
 
 def read_file(path: str | Path) -> tuple[Network, str]:

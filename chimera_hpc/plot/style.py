@@ -185,6 +185,8 @@ def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
             if not thin_ticks(figure):
                 break
             figure.savefig(png, dpi=200)
+        # Both files share one layout, which takes a third of the time of drawing.
+        figure.set_layout_engine("none")
         figure.savefig(pdf, dpi=200, metadata={"CreationDate": None})
     return png, pdf
 

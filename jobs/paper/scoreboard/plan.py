@@ -12,6 +12,9 @@ from chimera_hpc.job.shipped import jobs_folder
 JOBS = (
     "diagonal",
     "orientation2",
+    "plane",
+    "basin-200",
+    "basin",
     "networks",
     "networks-2",
     "synthetic",
@@ -26,11 +29,8 @@ JOBS = (
     "robustness-random",
     "robustness-node",
     "networked",
-    "plane",
-    "basin",
-    "basin-200",
 )
-"""A job comes after those whose atlas it asks for."""
+"""A job comes after those whose atlas it asks for; the longest come early, short ones fill gaps."""
 
 TRIPLETS = tuple(
     name

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,6 @@ from scoreboard.chance import DRAWS, add_causes
 from scoreboard.claims import DEFAULT, finding, markdown, read_claims, scoreboard, summary
 from scoreboard.evidence import Evidence
 from scoreboard.plan import JOBS, PRINTED, TRIPLETS, needs, settings
-
-_ATLASES = ("diagonal", "orientation2")
 
 _HEAD = """\
 # Claims of the paper
@@ -163,25 +161,28 @@ def run_jobs(
 ) -> dict[str, tuple[int, float]]:
     """Run jobs, each a process of its own; return exit status and seconds by name.
 
-    Full jobs follow each other, all workers in one; thinned ones, too short for that, run side by
-    side, those whose classes judge the others before them.
+    Two full jobs run side by side, each with half of the workers: one starts, ends and draws by
+    one core. Of thinned ones, too short for workers, as many as there are workers.
     """
-    if not quick:
-        return dict(_run(name, folder, False, workers, say) for name in names)
-    done: dict[str, tuple[int, float]] = {}
-    for stage in (
-        [name for name in names if name in _ATLASES],
-        [name for name in names if name not in _ATLASES and name != "robustness-2"],
-        [name for name in names if name == "robustness-2"],
-    ):
-        with ThreadPoolExecutor(max_workers=max(workers, 1)) as pool:
-            done |= dict(pool.map(lambda name: _run(name, folder, True, 1, say), stage))
-    return done
+    at_once = max(1, workers if quick else min(2, workers))
+    each = max(1, workers // at_once)
+    running: dict[str, Future[tuple[int, float]]] = {}
+    with ThreadPoolExecutor(at_once) as pool:
+        for name in names:
+            needed = [running[other] for other in needs(name) if other in running]
+            running[name] = pool.submit(_run, name, folder, quick, each, say, needed)
+    return {name: job.result() for name, job in running.items()}
 
 
 def _run(
-    name: str, folder: Path, quick: bool, workers: int, say: Say
-) -> tuple[str, tuple[int, float]]:
+    name: str,
+    folder: Path,
+    quick: bool,
+    workers: int,
+    say: Say,
+    needed: Sequence[Future[tuple[int, float]]],
+) -> tuple[int, float]:
+    wait(needed)
     began = time.monotonic()
     place = ["--cluster", "serial"] if quick else ["--workers", str(workers)]
     changes = [word for text in settings(name, quick) for word in ("--set", text)]
@@ -196,7 +197,7 @@ def _run(
         )
     seconds = time.monotonic() - began
     say(f"{name:20s} {seconds:7.1f} s" + (f"  exit {ended.returncode}" if ended.returncode else ""))
-    return name, (ended.returncode, seconds)
+    return ended.returncode, seconds
 
 
 def cost(seconds: float) -> dict[str, float]:
