@@ -129,20 +129,40 @@ def test_another_numba_changes_the_cache_folder(monkeypatch):
     assert digest_now() != source_digest()
 
 
-@pytest.mark.slow
+CALLED = """
+from chimera_hpc.integrate.jit import jit
+
+@jit()
+def called(x):
+    return x + 1.0
+"""
+CALLING = """
+from chimera_hpc.measures.called import called
+from chimera_hpc.integrate.jit import jit
+
+@jit()
+def calling(x):
+    return 2.0 * called(x)
+"""
+
+
 def test_an_edit_of_a_called_kernel_is_obeyed_by_the_next_process(tmp_path):
     # numba alone serves the old code here: it looks at the file of the outermost function only.
     copy, cache = tmp_path / "chimera_hpc", tmp_path / "cache"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "measures" / "called.py").write_text(CALLED)
+    (copy / "measures" / "calling.py").write_text(CALLING)
 
-    def run(**environment):
-        return python(RUN, package=copy, NUMBA_CACHE_DIR=str(cache), **environment)
+    def run():
+        code = "from chimera_hpc.measures.calling import calling; print(calling(3.0))"
+        return python(code, package=copy, NUMBA_CACHE_DIR=str(cache), NUMBA_DEBUG_CACHE="1")
 
-    before = run()
-    assert before == run() == run_here() + "\n"
-    kernel = copy / "integrate" / "stepper.py"
-    kernel.write_text(kernel.read_text().replace("SAFETY, SMALLEST, ", "SMALLEST, SAFETY, "))
-    assert run() != before
+    assert "data saved" in run()
+    again = run()
+    assert again.endswith("\n8.0\n")
+    assert "data saved" not in again
+    (copy / "measures" / "called.py").write_text(CALLED.replace("1.0", "5.0"))
+    assert run().endswith("\n16.0\n")
     assert len(list(cache.iterdir())) == 2
 
 
