@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from chimera_hpc.recordings.recording import Array
 
 _DAY, _HOUR = 86400.0, 3600.0
 _CLOCK = r"(?:(\d+) days?,? +)?(\d+):(\d{1,2})(?::(\d{1,2}))?(?:[.,](\d+))?\s*([AaPp]\.?[Mm]\.?)?"
-_DATE = r"(\d{1,4})([-./])(\d{1,4})\2(\d{1,4})\.?(?:[ T,]+(.*))?"
+_DAY_ONLY = r"(\d{1,4})([-./])(\d{1,4})\2(\d{1,4})\.?"
+_DATE = _DAY_ONLY + r"(?:[ T,]+(.*))?"
 _COMPACT = (
     r"((?:1[89]|2[01])\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01]))"
     r"(?:[ T_-]?([01]\d|2[0-3]):?([0-5]\d)(?::?([0-5]\d)(?:[.,]?(\d+))?)?)?"
@@ -33,19 +35,23 @@ class Times(NamedTuple):
 
 def is_compact(words: Any) -> bool:
     """Whether these are dates without marks between their parts: YYYYMMDD, YYYYMMDDhhmm, ..."""
-    return bool(words.notna().all() and words.astype(str).str.fullmatch(_COMPACT).all())
+    return each(words, _COMPACT)
 
 
 def is_date(words: Any) -> bool:
     """Whether these are dates without a time of day."""
-    parts = words.astype(str).str.extract(f"^{_DATE}$")
-    whole = bool(parts[[0, 1, 2, 3]].notna().all(axis=None) and parts[4].isna().all())
-    return whole or (is_compact(words) and bool(words.str.len().eq(8).all()))
+    return each(words, _DAY_ONLY) or each(words, r"\d{8}") and is_compact(words)
 
 
 def is_clock(words: Any) -> bool:
     """Whether these are times of day."""
-    return bool(words.notna().all() and words.astype(str).str.fullmatch(_CLOCK).all())
+    return each(words, _CLOCK)
+
+
+def each(words: Iterable[Any], pattern: str) -> bool:
+    """Whether each of these words is whole what the pattern says; it ends at the first other."""
+    whole = re.compile(pattern).fullmatch
+    return all(isinstance(word, str) and whole(word) for word in words)
 
 
 def of_numbers(values: Array) -> Times:

@@ -15,6 +15,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.recordings.columns import goes_with, is_counter, places, without
 from chimera_hpc.recordings.dates import (
     Times,
+    each,
     is_clock,
     is_compact,
     is_date,
@@ -154,8 +155,7 @@ def _named(
         if name and seen[name] > 1:
             names[i] = f"{name}.{seen[name] - 1}"
             notes.append(f"two columns are called {name}: the later is {names[i]}")
-    firsts = pd.Series([c.strip() for c in _cells(lines[0], delimiter)])
-    dated = [i for i, word in enumerate(firsts) if is_compact(firsts[i : i + 1])]
+    dated = [i for i, word in enumerate(_cells(lines[0], delimiter)) if is_compact([word.strip()])]
     try:
         table = pd.read_csv(
             io.StringIO("\n".join(lines)),
@@ -192,29 +192,27 @@ def _count(lines: list[str], delimiter: str | None) -> int:
 
 def _numbers(name: str, column: Any) -> Any:
     """Return a column as float64, or as its words where they are no numbers."""
-    import pandas as pd
-
     if column.dtype.kind in "iuf":
         return column.to_numpy(dtype=np.float64)
-    words = column.astype(object)
-    known = words.dropna().astype(str).str.strip()
+    words, filled = column.astype(object), column.notna().to_numpy()
+    known = [str(word).strip() for word in words[filled]]
     if is_compact(known):
         return words
-    if known.str.fullmatch(r"[-+]?\d+(\.\d*)?").all():
-        return pd.to_numeric(known).reindex(column.index).to_numpy(dtype=np.float64)
-    if not known.str.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?").all():
+    if not each(known, r"[-+]?\d+(\.\d*)?"):
+        if not each(known, r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?"):
+            return words
+        comma = [word for word in known if "," in word]
+        if any("." in word for word in comma) or not each(known, r".*,.*|[-+]?\d+|.*[eE].*"):
+            return words if not comma else _refuse_commas(name, known)
+        if each(known, r"[-+]?([1-9]\d{0,2}(,\d{3})+|\d+)") and not any(
+                word.startswith(("0", "-0")) for word in comma):  # fmt: skip
+            return _refuse_commas(name, known)
+    made = np.full(len(words), np.nan)
+    try:
+        made[filled] = [float(word.replace(",", ".")) for word in known]
+    except ValueError:  # two commas
         return words
-    comma = known.str.contains(",", regex=False)
-    integer = known.str.fullmatch(r"[-+]?\d+")
-    thousands = known.str.fullmatch(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
-    if (comma & known.str.contains(".", regex=False)).any() or not (
-        comma | integer | known.str.contains("[eE]")
-    ).all():
-        return words if not comma.any() else _refuse_commas(name, known)
-    if (thousands | integer).all() and not (known[comma].str.startswith(("0", "-0"))).any():
-        return _refuse_commas(name, known)
-    made = pd.to_numeric(known.str.replace(",", ".", regex=False), errors="coerce")
-    return words if made.isna().any() else made.reindex(column.index).to_numpy(dtype=np.float64)
+    return made
 
 
 def _refuse_points(
@@ -252,12 +250,14 @@ def _time(
         return found[0], f"times: column {choice.time}"
     first, note = next(iter(columns)), ""
     if named:
-        likely = [i for i in columns if TIME.search(names[i])]
+        called = [i for i in columns if TIME.search(names[i])]
+        likely = list(called)
         if not names[first] and not is_counter(columns[first]):
             likely.append(first)
         likely += [i for i in columns if not likely and not isinstance(columns[i], np.ndarray)]
-        found = [i for i in likely if _may_rise(columns[i], names[i])] or [
-            i for i in likely if TIME.search(names[i])]  # fmt: skip
+        rising = likely if likely == called and len(likely) == 1 else [
+            i for i in likely if _may_rise(columns[i], names[i])]  # fmt: skip
+        found = rising or called
         note = f"times: column {names[found[0]] or 'without a name'}" if found else ""
     else:
         rises = len(columns) > 1 and not is_counter(columns[first])
