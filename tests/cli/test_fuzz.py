@@ -178,13 +178,12 @@ COMMANDS = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("copied", [True, False], ids=["with its copy", "without a copy"])
-@settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_damage_to_the_attributes_of_a_store(
-    copied: bool, job: Path, finished: Path, choose: st.DataObject
+    job: Path, finished: Path, choose: st.DataObject
 ) -> None:
-    folder = restored(finished)
+    folder, copied = restored(finished), choose.draw(st.sampled_from([True, False, False]))
     root = folder / "store.zarr" / "zarr.json"
     root.write_bytes(spoilt(choose, root.read_bytes()))
     if not copied:
@@ -231,7 +230,7 @@ def test_any_bytes_as_a_ledger_chunk(finished: Path, data: bytes, command: tuple
 
 
 @pytest.mark.slow
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(chunks)
 def test_any_ledger_chunk_is_mended_by_run(job: Path, finished: Path, data: bytes) -> None:
     ledger = restored(finished) / "store.zarr" / "ledger"
