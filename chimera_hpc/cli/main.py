@@ -77,6 +77,7 @@ def _execute(typed: list[str], program: list[str] | None) -> int:
     args.typed, args.program = typed, program
     if program is not None:
         watchdog.on_hang = give_up
+        watchdog.listen()
         prepare_home()
     args.parser_named = parser
     try:

@@ -40,7 +40,7 @@ def is_compact(words: Any) -> bool:
 
 def is_date(words: Any) -> bool:
     """Whether these are dates without a time of day."""
-    return each(words, _DAY_ONLY) or each(words, r"\d{8}") and is_compact(words)
+    return each(words, _DAY_ONLY) or (each(words, r"\d{8}") and is_compact(words))
 
 
 def is_clock(words: Any) -> bool:

@@ -191,14 +191,24 @@ class Driver:
     def _serial(self, message: RunMessage) -> None:
         from chimera_hpc.run.executors import run_serial
 
-        before, watchdog.on_hang = watchdog.on_hang, lambda text: self._start_again(text, message)
+        before = watchdog.on_hang, watchdog.on_stop
+        watchdog.on_hang = lambda text: self._start_again(text, message)
+        watchdog.on_stop = lambda: self._give_back(message)
         try:
             for blocks in self._rounds():
                 run_serial(
                     message, self._in_time(blocks), self._receiver(message), self.should_stop
                 )
         finally:
-            watchdog.on_hang = before
+            watchdog.on_hang, watchdog.on_stop = before
+
+    def _give_back(self, message: RunMessage) -> None:
+        """Leave the blocks in hand to another process: this one is stopped in its model."""
+        from chimera_hpc.run.work import hand_back_all
+
+        hand_back_all()
+        self._record(message)
+        self.reporter.close()
 
     def _start_again(self, text: str, message: RunMessage) -> None:
         """Have the same command in the place of this process, whose model does not return."""

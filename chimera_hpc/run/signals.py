@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 from chimera_hpc.base.exits import Exit
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGHUP)
+STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGHUP})
+
+
+def exit_status(asked: Collection[int]) -> Exit:
+    """Return the status to leave with when these signals ended unfinished work."""
+    return Exit.INTERRUPTED if signal.SIGINT in asked else Exit.MORE_TO_DO
 
 
 class StopRequest:
@@ -27,7 +32,7 @@ class StopRequest:
     @property
     def exit_status(self) -> Exit:
         """Status to leave with when the work was not finished."""
-        return Exit.INTERRUPTED if signal.SIGINT in self.asked else Exit.MORE_TO_DO
+        return exit_status(self.asked)
 
     @contextmanager
     def good_order(self) -> Iterator[None]:
@@ -55,7 +60,7 @@ def stop_request() -> Iterator[StopRequest]:
     stays so; the handlers before are put back at the end.
     """
     request = StopRequest()
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     taken = [number for number, handler in before.items() if handler != signal.SIG_IGN]
     for number in taken:
         signal.signal(number, request.take)

@@ -178,6 +178,37 @@ with foreign_code():
     assert said == ""
 
 
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 75)])
+def test_signal_that_a_model_lets_nobody_take_ends_the_process_after_a_while(
+    number: int, status: int
+) -> None:
+    code = """
+import signal, types
+from chimera_hpc.base.foreign import foreign_code
+from chimera_hpc.run import watchdog
+watchdog.limit_of, watchdog._LOOK_SECONDS, watchdog._GRACE_SECONDS = lambda sweep: 99.0, 0.05, 0.2
+signal.signal(signal.SIGINT, print)
+signal.signal(signal.SIGTERM, print)
+watchdog.watchdog.listen()
+watchdog.watchdog.on_stop = lambda: print("given back", flush=True)
+watchdog.watchdog.watch(types.SimpleNamespace(model="mine:MODEL"))
+with foreign_code():
+    print("in", flush=True)
+    while True:
+        input()
+"""
+    words = [sys.executable, "-c", code]
+    with subprocess.Popen(words, stdin=-1, stdout=-1, stderr=-1, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "in\n"
+        process.send_signal(number)
+        # The program's end of its input would end it, too.
+        assert process.wait(60) == status
+        said, error = process.stdout.read(), process.stderr.read() if process.stderr else ""
+    assert said.endswith("given back\n")
+    assert error == "stopped: mine:MODEL does not return; the same command goes on\n"
+
+
 def test_forked_process_knows_no_call_of_another_thread() -> None:
     with foreign_code():
         pid = os.fork()
