@@ -29,9 +29,9 @@ _GRACE_SECONDS = 5.0
 _LIMIT = "(integrator.time_out + run.patience)"
 
 
-def say(text: str) -> None:
+def say(text: str, what: str = "error") -> None:
     """Write what has happened to the standard error output."""
-    sys.stderr.write(f"error: {text}\n")
+    sys.stderr.write(f"{what}: {text}\n")
     sys.stderr.flush()
 
 
@@ -94,8 +94,7 @@ class Watchdog:
 
     def _stop(self) -> NoReturn:
         self.on_stop()
-        print(f"stopped: {self._sweep.model} does not return; the same command goes on",
-              file=sys.stderr, flush=True)  # fmt: skip
+        say(f"{self._sweep.model} does not return; the same command goes on", "stopped")
         os._exit(exit_status(self._heard))
 
 
