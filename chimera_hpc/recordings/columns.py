@@ -80,7 +80,8 @@ def _but(recording: Recording, left: Sequence[int]) -> Recording:
     gone = set(left)
     kept = [i for i in range(len(recording.names)) if i not in gone]
     if not kept:
-        raise BadInput("no node is left: all columns are left out, or count samples or times")
+        raise BadInput("no node is left: all columns are left out, or count samples or times "
+                       "(phases that grow? save their cosine)")  # fmt: skip
     names = tuple(recording.names[i] for i in kept)
     return replace(recording, u=recording.u[:, kept], names=names)
 
@@ -161,7 +162,20 @@ def suspects(u: Array, names: Sequence[str]) -> list[str]:
     twins = [i for i in twins if spread[i] > 0.0]
     if twins:
         lines.append(_drop([names[i] for i in twins], "has the same values as another node"))
+    if _are_phases(u[:, spread > 0.0]):
+        lines.append("signals leap by a whole turn: phases? save their cosine, the maxima of "
+                     "phases are not those of a signal")  # fmt: skip
     return lines
+
+
+def _are_phases(u: Array) -> bool:
+    """Whether signals go through a turn, in radians or degrees, and leap back by nearly as much."""
+    if not u.size or len(u) < _FEWEST:
+        return False
+    width = np.nanmax(u, axis=0) - np.nanmin(u, axis=0)
+    leap = np.nanmax(np.abs(np.diff(u, axis=0)), axis=0, initial=0.0)
+    turn = any(((width > 0.9 * full) & (width <= full)).all() for full in (2.0 * np.pi, 360.0))
+    return turn and bool((leap > 0.8 * width).all())
 
 
 def _drop(names: list[str], what: str) -> str:

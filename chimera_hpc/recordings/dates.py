@@ -23,6 +23,8 @@ _COMPACT = (
 DATED = "dates were taken for seconds since the first"
 _UNITS = (("seconds", 1.0), ("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
 """What times since 1970 are counted in."""
+_DAYS = {"a spreadsheet": (25e3, 80e3), "MATLAB": (7e5, 8e5)}
+"""Dates of 1968 to 2119 and of 1916 to 2190 as numbers of days."""
 
 
 class Times(NamedTuple):
@@ -57,7 +59,8 @@ def each(words: Iterable[Any], pattern: str) -> bool:
 def of_numbers(values: Array) -> Times:
     """Return numbers as they are, but dates YYYYMMDD, ... in seconds since the first.
 
-    Numbers that look like times since 1970 in another unit than seconds are warned of.
+    Numbers that look like times since 1970 in another unit than seconds, or like the days that
+    spreadsheets and MATLAB count, are warned of.
     """
     import pandas as pd
 
@@ -70,6 +73,11 @@ def of_numbers(values: Array) -> Times:
         if 0.9e9 * factor <= low and high < 2.2e9 * factor:
             said = (f"times look like {name} since 1970: frequencies are per {name[:-1]}; "
                     f"--factors {1.0 / factor:g},1 makes them per second")  # fmt: skip
+            return Times(values, [], [said])
+    for program, (first, end) in _DAYS.items():
+        if first <= low and high < end and np.median(np.diff(values)) < 60.0 / _DAY:
+            said = (f"times look like dates as {program} counts them, in days: frequencies are per "
+                    "day; --factors 86400,1 makes them per second")  # fmt: skip
             return Times(values, [], [said])
     return Times(values, [], [])
 
@@ -172,7 +180,7 @@ def _ordered(parts: Any, clock: Array, name: str) -> Times:
     made = [one for order in orders if (one := _read_as(order, parts, clock)) is not None]
     if not made:
         raise BadInput(f"column {name}: dates do not rise, in whatever order of day, month and "
-                       "year (a clock set back by summer time?)")  # fmt: skip
+                       "year (a clock set back by summer time? several lines a time?)")  # fmt: skip
     best = [one for one in made if one[0] <= min(made)[0]]
     if mark == ".":  # day first; with two digits of the year, the day is what changes fastest
         best = [one for one in best if one[1] != "mdy"] or best

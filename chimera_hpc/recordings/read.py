@@ -24,6 +24,7 @@ Reader = Callable[[Path, Choice], Recording]
 
 _TIMES = ("t", "time", "times")
 _SIGNALS = ("u", "x", "y", "data", "signal", "signals")
+_SHEETS = (".xls", ".xlsx", ".xlsm", ".ods", ".numbers")
 _ZARR = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
 
 
@@ -58,7 +59,10 @@ def _reader(path: Path) -> Reader:
     if not path.exists():
         raise BadInput("no such file")
     if not known_ending(path):
-        raise BadInput(f"allowed are {', '.join(READERS)}, tables with .gz too, and Zarr stores")
+        sheet = "save the sheet as CSV; " if _ending(path) in _SHEETS else ""
+        raise BadInput(
+            f"{sheet}allowed are {', '.join(READERS)}, tables with .gz too, and Zarr stores"
+        )
     return READERS[_ending(path)]
 
 

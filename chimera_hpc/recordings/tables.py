@@ -31,6 +31,9 @@ _SAMPLE = 1000
 _MOST = 0.9
 _MISSING = ["", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "#n/a",
             "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!"]  # fmt: skip
+_UNIT = re.compile(r"(?<![^\W_])(ms|msecs?|milliseconds?|us|µs|ns|min|minutes?|h|hours?|days?)"
+                   r"(?![^\W_])", re.IGNORECASE)  # fmt: skip
+"""Units of time other than seconds, in the name of a column."""
 _COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
 
@@ -72,6 +75,8 @@ def read_table(path: Path, choice: Choice) -> Recording:
     if time is not None:
         t, how, said = _times(_on_day(columns, time, day), every[time])
         notes += [note if day is None else f"times: columns {every[day]} and {every[time]}", *how]
+        if isinstance(columns[time], np.ndarray) and (unit := _UNIT.search(every[time])):
+            notes.append(f"frequencies are per {unit[0]}, the unit in that column's name")
     else:
         notes.append("every column is a node")
     u = np.column_stack([columns[i] for i in nodes])
@@ -128,7 +133,7 @@ def _head(lines: list[str], delimiter: str | None) -> tuple[list[list[str]], lis
         elif len(head) and any(_number(c) for c in cells) and len(cells) == len(head[-1]):
             return head, lines[i:]  # the number that is a word is named later
         head.append(cells)
-    raise BadInput("has lines of words and no other")
+    raise BadInput(f"has no line of numbers: {lines[-1].strip()[:40]!r} stands in the last one")
 
 
 def _named(

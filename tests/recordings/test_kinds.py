@@ -177,11 +177,46 @@ def test_forms_of_dates(times: list[str], name: str, seconds: list[float], tmp_p
         (["30:00", "30:01", "30:02"], "'30:02' was taken for mm:ss; if it is hh:mm"),
         (["1675209600000", "1675209600020"], "milliseconds since 1970.* --factors 0.001,1"),
         (["1675209600000000000", "1675209600020000000"], "nanoseconds since 1970"),
+        (["45012.25", "45012.2501", "45012.2502"], "dates as a spreadsheet counts.* 86400,1"),
+        (["738972,25", "738972,2501"], "dates as MATLAB counts.* 86400,1"),
     ],
 )
 def test_doubtful_units_of_time_are_warned_of(times: list[str], said: str, tmp_path: Path):
     line = read_times(times, "time", tmp_path).warnings[0]
     assert re.search(said, line)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Time (ms)", "ms"), ("t_min", "min"), ("t [h]", "h")])
+def test_unit_of_time_in_a_name_is_said(name: str, unit: str, tmp_path: Path):
+    (said,) = [line for line in read_times(["0", "20"], name, tmp_path).notes if "per" in line]
+    assert said == f"frequencies are per {unit}, the unit in that column's name"
+    assert not any("per" in note for note in read_times(["0", "20"], "time_s", tmp_path).notes)
+
+
+def test_several_lines_for_one_time_are_refused(tmp_path: Path):
+    made = read_times(["0", "0", "1"], "time", tmp_path)
+    with pytest.raises(BadInput, match="one line per time and one column per node are needed"):
+        prepare(with_times(made, None), None)
+
+
+@pytest.mark.parametrize("turn", [2 * np.pi, 360.0])
+def test_phases_are_named(turn: float):
+    phases = turn * ((T[:, None] + np.arange(8) / 8) % 1.0)
+    assert any("phases? save their cosine" in line for line in prepare(
+        Recording(T, phases), None).warnings)  # fmt: skip
+    assert prepare(Recording(T, 0.5 * turn * U), None).warnings == ()
+    with pytest.raises(BadInput, match="phases that grow"):
+        with_times(Recording(T, turn * T[:, None] + np.arange(8)), None)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("u.xlsx", "save the sheet as CSV"), ("u.dat", "no line of numbers: '1.0D0 2.0D0' stands")],
+)
+def test_files_without_numbers_are_refused_with_what_to_do(name: str, said: str, tmp_path: Path):
+    (tmp_path / name).write_text("1.0D0 2.0D0\n")
+    with pytest.raises(BadInput, match=said):
+        read_recording(tmp_path / name, Choice())
 
 
 @pytest.mark.parametrize("time", ["00:00:98", "24:00:00x", "2026-01-31 25:00:00"])
@@ -254,3 +289,10 @@ def test_structure_of_matlab_is_looked_into(tmp_path: Path):
 def test_order_is_read_from_a_file_with_a_byte_order_mark(tmp_path: Path):
     (tmp_path / "order.txt").write_text("3\n1\n0\n", encoding="utf-16")
     assert in_order(Recording(T, U), str(tmp_path / "order.txt")).names == ("3", "1", "0")
+
+
+def test_order_may_be_longer_than_the_name_of_a_file():
+    names = tuple(f"electrode {i}" for i in range(100))
+    wide = Recording(T[:9], np.tile(U[:9], 13)[:, :100], names)
+    assert in_order(wide, ",".join(map(str, range(100)))).names == names
+    assert in_order(wide, ",".join(names[::-1])).names == names[::-1]

@@ -154,7 +154,7 @@ def test_zarr_store_is_read(tmp_path: Path):
     [
         ("u.xyz", b"", "allowed are .npz, .npy, .csv"),
         ("u.csv", b"", "is empty"),
-        ("u.csv", b"a,b\n", "no other"),
+        ("u.csv", b"a,b\n", "no line of numbers"),
         ("u.csv", b"t,a\n0,1\n1,one\n", "column a: 'one' is not a number"),
         ("u.csv", b"\xff\xfe\x00", "can't be read"),
         ("u.csv", b"1,2\n3,4,5,6\n7,8\n", "can't be read as a table"),
