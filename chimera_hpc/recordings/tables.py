@@ -31,9 +31,6 @@ _SAMPLE = 1000
 _MOST = 0.9
 _MISSING = ["", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "#n/a",
             "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!"]  # fmt: skip
-_UNIT = re.compile(r"(?<![^\W_])(ms|msecs?|milliseconds?|us|µs|ns|min|minutes?|h|hours?|days?)"
-                   r"(?![^\W_])", re.IGNORECASE)  # fmt: skip
-"""Units of time other than seconds, in the name of a column."""
 _COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
 
@@ -75,8 +72,6 @@ def read_table(path: Path, choice: Choice) -> Recording:
     if time is not None:
         t, how, said = _times(_on_day(columns, time, day), every[time])
         notes += [note if day is None else f"times: columns {every[day]} and {every[time]}", *how]
-        if isinstance(columns[time], np.ndarray) and (unit := _UNIT.search(every[time])):
-            notes.append(f"frequencies are per {unit[0]}, the unit in that column's name")
     else:
         notes.append("every column is a node")
     u = np.column_stack([columns[i] for i in nodes])

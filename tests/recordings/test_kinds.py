@@ -186,13 +186,6 @@ def test_doubtful_units_of_time_are_warned_of(times: list[str], said: str, tmp_p
     assert re.search(said, line)
 
 
-@pytest.mark.parametrize(("name", "unit"), [("Time (ms)", "ms"), ("t_min", "min"), ("t [h]", "h")])
-def test_unit_of_time_in_a_name_is_said(name: str, unit: str, tmp_path: Path):
-    (said,) = [line for line in read_times(["0", "20"], name, tmp_path).notes if "per" in line]
-    assert said == f"frequencies are per {unit}, the unit in that column's name"
-    assert not any("per" in note for note in read_times(["0", "20"], "time_s", tmp_path).notes)
-
-
 def test_several_lines_for_one_time_are_refused(tmp_path: Path):
     made = read_times(["0", "0", "1"], "time", tmp_path)
     with pytest.raises(BadInput, match="one line per time and one column per node are needed"):
