@@ -81,9 +81,10 @@ def _refuse_times(t: Array) -> None:
     falls = np.flatnonzero(np.diff(t) <= 0.0)
     if len(falls):
         i = int(falls[0])
-        long = "; one line per time and one column per node are needed" if t[i + 1] in t[: i + 1] else ""
-        raise BadInput(f"times must rise: {t[i + 1]:.9g} follows {t[i]:.9g} "
-                       f"(samples {i}, {i + 1}){long}")  # fmt: skip
+        said = f"times must rise: {t[i + 1]:.9g} follows {t[i]:.9g} (samples {i}, {i + 1})"
+        if t[i + 1] in t[: i + 1]:
+            said += "; one line per time and one column per node are needed"
+        raise BadInput(said)
 
 
 def in_order(recording: Recording, order: str | None) -> Recording:
