@@ -31,7 +31,8 @@ MOST_CELLS = 600
 MOST_BYTES = 5_500_000
 """Cells with a picture and profiles, and what these may take of the page in all."""
 MOST_SECONDS = 20.0
-"""Work on replaying runs whose series the store does not keep."""
+"""Work on replaying runs whose series the store does not keep: a tenth of the sweep's, but at least
+a quarter of this and at most this."""
 _PERIODS = 8
 _COLUMNS, _ROWS = 240, 128
 """Most samples of a picture along time and along the ring."""
@@ -155,8 +156,9 @@ def affordable(content: Content) -> int:
     ran = content.status != Status.NEVER
     if not ran.any():
         return 0
-    seconds = float(content.scan.columns["elapsed_us"][ran].mean()) / 1e6
-    return int(MOST_SECONDS / max(seconds, 1e-6))
+    seconds = content.scan.columns["elapsed_us"][ran] / 1e6
+    budget = min(MOST_SECONDS, max(MOST_SECONDS / 4, float(seconds.sum()) / 10))
+    return int(budget / max(float(seconds.mean()), 1e-6))
 
 
 def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array, NodeSeries]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -25,20 +27,34 @@ Say = Callable[[str], None]
 def audit_jobs(
     folder: Path, names: Sequence[str], share: float, workers: int, say: Say
 ) -> dict[str, Any]:
-    """Audit jobs that lie beside each other; one entry a job, as its results.json has it."""
+    """Audit jobs that lie beside each other; one entry a job, as its results.json has it.
+
+    Each worker audits whole jobs: most are too short for workers of their own.
+    """
+    chosen = [n for n in names if n not in _SHORT and (folder / n / STORE_NAME).is_dir()]
     found = {}
-    for name in names:
-        if name in _SHORT or not (folder / name / STORE_NAME).is_dir():
-            continue
-        sample = Sample(share, seed=_SEED + JOBS.index(name))
-        ways = tuple(way for way in WAYS if way != "longer" or name not in _BASINS)
-        try:
-            found[name] = audit_sweep(folder / name, sample, workers=workers, ways=ways)
-        except BadInput as error:
-            say(f"audit {name}: {error}")
-        else:
-            say(f"audit {name}: {_line(found[name])}")
+    with _pool(min(workers, len(chosen))) as pool:
+        made = {name: pool.submit(_audit, folder, name, share) for name in chosen}
+        for name, audit in made.items():
+            try:
+                found[name] = audit.result()
+            except BadInput as error:
+                say(f"audit {name}: {error}")
+            else:
+                say(f"audit {name}: {_line(found[name])}")
     return found
+
+
+def _pool(workers: int) -> Executor:
+    if workers < 2:
+        return ThreadPoolExecutor(1)
+    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+
+
+def _audit(folder: Path, name: str, share: float) -> dict[str, Any]:
+    sample = Sample(share, seed=_SEED + JOBS.index(name))
+    ways = tuple(way for way in WAYS if way != "longer" or name not in _BASINS)
+    return audit_sweep(folder / name, sample, ways=ways)
 
 
 def audits_under(folder: Path, names: Sequence[str], convention: str) -> dict[str, Any]:

@@ -1,8 +1,9 @@
-"""The jobs of the paper in the order in which they are run, and how --quick thins them."""
+"""The jobs of the paper, the order in which they are run, and how --quick thins them."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from chimera_hpc.job import Sweep
@@ -12,9 +13,6 @@ from chimera_hpc.job.shipped import jobs_folder
 JOBS = (
     "diagonal",
     "orientation2",
-    "plane",
-    "basin-200",
-    "basin",
     "networks",
     "networks-2",
     "synthetic",
@@ -29,8 +27,14 @@ JOBS = (
     "robustness-random",
     "robustness-node",
     "networked",
+    "plane",
+    "basin",
+    "basin-200",
 )
-"""A job comes after those whose atlas it asks for; the longest come early, short ones fill gaps."""
+"""A job comes after those whose atlas it asks for."""
+
+_FIRST = ("diagonal", "orientation2", "plane", "basin-200", "basin")
+"""Jobs to run first: those that others ask for, then the longest; short ones fill the gaps."""
 
 TRIPLETS = tuple(
     name
@@ -66,6 +70,14 @@ QUICK: dict[str, tuple[str, ...]] = {
 def settings(name: str, quick: bool) -> tuple[str, ...]:
     """Return the overrides of a job: both conventions are measured of the same runs."""
     return (*((_PANEL,) if name in TRIPLETS else ()), *(QUICK.get(name, ()) if quick else ()))
+
+
+def running_order(names: Sequence[str]) -> list[str]:
+    """Return jobs in the order in which they start."""
+    return [
+        *(name for name in _FIRST if name in names),
+        *(name for name in names if name not in _FIRST),
+    ]
 
 
 def job_files(folder: str | Path) -> dict[str, Path]:

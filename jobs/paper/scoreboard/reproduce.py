@@ -23,7 +23,7 @@ from scoreboard.causes import read_causes
 from scoreboard.chance import DRAWS, add_causes
 from scoreboard.claims import DEFAULT, finding, markdown, read_claims, scoreboard, summary
 from scoreboard.evidence import Evidence
-from scoreboard.plan import JOBS, PRINTED, TRIPLETS, needs, settings
+from scoreboard.plan import JOBS, PRINTED, TRIPLETS, needs, running_order, settings
 
 _HEAD = """\
 # Claims of the paper
@@ -168,10 +168,10 @@ def run_jobs(
     each = max(1, workers // at_once)
     running: dict[str, Future[tuple[int, float]]] = {}
     with ThreadPoolExecutor(at_once) as pool:
-        for name in names:
+        for name in running_order(names):
             needed = [running[other] for other in needs(name) if other in running]
             running[name] = pool.submit(_run, name, folder, quick, each, say, needed)
-    return {name: job.result() for name, job in running.items()}
+    return {name: running[name].result() for name in names}
 
 
 def _run(
