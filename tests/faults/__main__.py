@@ -2,7 +2,8 @@
 
 ``scripts/faults --trials 20`` runs each fault 20 times at random moments; ``--only TEXT,...`` those
 with one of these texts in their name; ``--seed`` chooses the moments; ``--jobs`` how many trials
-run at a time, for they mostly wait; ``--json FILE`` writes the table too.
+run at a time, for they mostly wait; ``--json FILE`` writes the table too; ``--brief`` runs one
+trial of each fault, two where these are two different things.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ class Row:
     """All trials of one fault."""
 
     fault: str
+    planned: int
     trials: int = 0
     lost: int = 0
     recomputed: int = 0
@@ -92,14 +94,15 @@ def main() -> int:
     folder = Path(tempfile.mkdtemp(prefix="chimera-faults-", dir=args.folder))
     _import_everything(folder)
     reference = _reference(folder)
-    rows = {name: Row(name) for name in names}
+    least = {name: 1 + FAULTS[name].by_turns for name in names}
+    rows = {name: Row(name, least[name] if args.brief else args.trials) for name in names}
     broken_off = False
     try:
-        for name, outcome in _trials(names, folder, reference, args):
+        for name, outcome in _trials(rows, folder, reference, args):
             rows[name].add(outcome)
             if outcome.finding is not None and not outcome.finding.good:
                 print(f"{name}: {outcome.finding}", flush=True)
-            if rows[name].trials == args.trials:
+            if rows[name].trials == rows[name].planned:
                 print(rows[name].verdict(), flush=True)
     except KeyboardInterrupt:
         broken_off = True
@@ -135,16 +138,16 @@ def table(rows: list[Row]) -> str:
 
 
 def _trials(
-    names: list[str], folder: Path, reference: Reference, args: argparse.Namespace
+    rows: dict[str, Row], folder: Path, reference: Reference, args: argparse.Namespace
 ) -> Iterator[tuple[str, Outcome]]:
     """Run all trials, some at a time, each from a process of its own; yield how they came out."""
-    waiting = [(number, name) for number in range(args.trials) for name in names]
-    waiting.reverse()
+    waiting = [(number, name) for name, row in rows.items() for number in range(row.planned)]
+    waiting.sort(key=lambda trial: trial[0])
     running: dict[Child, tuple[str, Path]] = {}
     try:
         while waiting or running:
             while waiting and len(running) < args.jobs:
-                number, name = waiting.pop()
+                number, name = waiting.pop(0)
                 place = folder / f"{name.replace(' ', '-')}-{number}"
                 chance = random.Random(f"{args.seed} {name} {number}")
                 output = folder / f"{place.name}.txt"
@@ -230,6 +233,7 @@ def _import_everything(folder: Path) -> None:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="scripts/faults", description=__doc__.splitlines()[0])
     parser.add_argument("--trials", type=int, default=2, help="trials a fault (default: 2)")
+    parser.add_argument("--brief", action="store_true", help="one trial a fault, or two")
     parser.add_argument("--only", default="", metavar="TEXT,...",
                         help="faults with one of these in their name")  # fmt: skip
     parser.add_argument("--jobs", type=int, default=4, help="trials at a time (default: 4)")

@@ -45,6 +45,10 @@ class Strike:
     """Exit statuses that it may have."""
     allowed: int
 
+    @property
+    def by_turns(self) -> bool:
+        return self.options == PLACES
+
     def __call__(self, trial: Trial) -> Finding:
         child = trial.start_run(*(self.options or trial.places))
         trial.wait_for_a_moment(child)
@@ -62,6 +66,7 @@ class Surroundings:
     options: tuple[str, ...]
     around: Callable[[Trial], contextlib.AbstractContextManager[dict[str, str]]]
     """What is wrong while it runs; gives its environment."""
+    by_turns = False
 
     def __call__(self, trial: Trial) -> Finding:
         with self.around(trial) as environment:
@@ -84,6 +89,10 @@ class Culprit:
     said: str = ""
     """In the list of failures."""
 
+    @property
+    def by_turns(self) -> bool:
+        return self.options == PLACES
+
     def __call__(self, trial: Trial) -> Finding:
         trouble = f"{self.kind}:{BROKEN[0]}:{BROKEN[1]}"
         child = trial.start_run(*(self.options or trial.places), TROUBLE=trouble)
@@ -104,6 +113,7 @@ class Damage:
     name: str
     action: Callable[[Trial], object]
     allowed: int
+    by_turns = False
 
     def __call__(self, trial: Trial) -> Finding:
         _copy_reference(trial)
@@ -118,6 +128,8 @@ class Story:
 
     name: str
     action: Callable[[Trial], Finding]
+    by_turns: bool = False
+    """Whether an even trial and an odd one are two different things."""
 
     def __call__(self, trial: Trial) -> Finding:
         return self.action(trial)
@@ -532,9 +544,9 @@ TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
            lambda _, run: _signal(run.workers()[:1], signal.SIGSTOP), 0, BLOCK),
     Strike("SIGSTOP of a worker, late awakening", LOCAL, _stop_a_worker_for_a_while, 0, BLOCK),
     Story("SIGSTOP of a driver, late awakening", hang_driver_for_a_while),
-    Story("two drivers at once", two_drivers),
+    Story("two drivers at once", two_drivers, by_turns=True),
     Story("three drivers, their clocks an hour apart", skewed_clocks),
-    Story("kill -9 of the scheduler", kill_scheduler),
+    Story("kill -9 of the scheduler", kill_scheduler, by_turns=True),
     # Points that misbehave
     Culprit("a point that never ends", "forever", (*SERIAL, "--set", "integrator.time_out=3")),
     Culprit("a point that blows up", "blow-up"),
@@ -547,7 +559,7 @@ TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
     Culprit("a right-hand side that never returns, in one process", "hang", (*SERIAL, *_HANG), 2,
             "time-out: the model did not return"),
     # Disks
-    Story("disk full", disk_full),
+    Story("disk full", disk_full, by_turns=True),
     Story("store read-only half-way", read_only),
     Surroundings("full /tmp", LOCAL, _full_tmp),
     Surroundings("read-only home", LOCAL, _read_only_home),
@@ -558,8 +570,8 @@ TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
     Story("partial files left over", left_over),
     Story("attributes damaged", attributes_damaged),
     # Another model than that of the results
-    Story("a changed weight file", weight_changed),
-    Story("two candidate modules", two_modules),
+    Story("a changed weight file", weight_changed, by_turns=True),
+    Story("two candidate modules", two_modules, by_turns=True),
     # Kills in the middle of other commands
     Story("kill -9 during plan", kill_plan),
     Story("kill -9 during extend", kill_extend),
