@@ -10,8 +10,9 @@ import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,11 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import temporary_name
 from chimera_hpc.base.status import Status
+from chimera_hpc.reduction.netcdf3 import Layout, resized
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.labelled import open_sweep
 from chimera_hpc.store.store import Store
+from chimera_hpc.store.strips import PackedSeries
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,16 +51,20 @@ def to_netcdf(store: Store, target: Path, series: bool = False) -> None:
     NetCDF 4 where a library for it is there. NetCDF 3, which SciPy writes, has no 64-bit integers.
     Integers that need more than 32 bits are floats there, which hold 53 bits exactly; those that
     need still more are texts of decimal digits, and digests are texts of 16 hexadecimal digits.
-    Points are written some at a time. With NetCDF 3, `point` is then the unlimited dimension.
+    Points are written some at a time, and large series in pieces. With NetCDF 3, `point` is the
+    unlimited dimension.
     """
     import dask
 
-    dataset = _dataset(store, series)
+    if series and "u" not in store.files.shapes:
+        raise BadInput(f"{store.path}: holds no series (keep.series = 'none')")
+    packed = PackedSeries(store) if series else None
+    dataset = _dataset(store, packed)
     engine: Any = next((name for name, module in _NETCDF_4 if find_spec(module)), "scipy")
     # Threads would each hold a block.
     with _replaced(target) as temporary, dask.config.set(scheduler="synchronous"):
         if engine == "scipy":
-            _write_netcdf_3(_of_netcdf_3(dataset), temporary, store.block_size)
+            _write_netcdf_3(_of_netcdf_3(dataset), packed, temporary)
         else:
             dataset.to_netcdf(temporary, format="NETCDF4", engine=engine)
 
@@ -73,16 +80,20 @@ def _replaced(target: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _dataset(store: Store, series: bool) -> xr.Dataset:
+def _dataset(store: Store, series: PackedSeries | None) -> xr.Dataset:
     import xarray as xr
 
     dataset = open_sweep(store.path)
-    if series:
-        packed = xr.open_zarr(store.path, chunks={}, mask_and_scale=False)["u"]
-        packed.attrs["_FillValue"] = packed.dtype.type(packed.attrs["_FillValue"])
-        dataset["u"] = packed
-    else:
-        dataset = dataset.drop_vars(["u", "time"], errors="ignore")
+    dataset = dataset.drop_vars(["u"] if series is not None else ["u", "time"], errors="ignore")
+    if series is not None:
+        import dask.array as da
+
+        stored = xr.open_zarr(store.path, chunks=None, mask_and_scale=False)["u"]
+        attributes = dict(stored.attrs)
+        if "_FillValue" in attributes:
+            attributes["_FillValue"] = series.dtype.type(attributes["_FillValue"])
+        values = da.from_array(series, series.chunks, name=False, meta=np.empty(0, series.dtype))
+        dataset["u"] = (stored.dims, values, attributes)
     for variable in dataset.variables.values():
         # Chunks and codecs of the store mean nothing here.
         variable.encoding = {}
@@ -94,36 +105,68 @@ def _dataset(store: Store, series: bool) -> xr.Dataset:
     return dataset
 
 
-def _write_netcdf_3(dataset: xr.Dataset, path: Path, block_size: int) -> None:
-    """Write NetCDF 3; some points at a time if there are many bytes.
-
-    The records of an unlimited dimension are the end of the file. So the records of further files,
-    of the same variables, can be put behind those of the first one.
-    """
+def _write_netcdf_3(dataset: xr.Dataset, series: PackedSeries | None, path: Path) -> None:
+    """Write NetCDF 3, some points at a time; `point` is the unlimited dimension."""
+    first = {name: slice(0, 1) for name in dataset.dims}
+    tiny = dataset.isel(first).to_netcdf(format=_NETCDF_3, engine="scipy", unlimited_dims=["point"])
     n_points = dataset.sizes["point"]
-    step = max(1, _SLICE_BYTES * n_points // max(1, dataset.nbytes))
-    step -= step % block_size if step > block_size else 0
-    if step >= n_points:
-        dataset.to_netcdf(path, format=_NETCDF_3, engine="scipy")
-        return
-
-    def some(first: int, last: int) -> memoryview:
-        part = dataset.isel(point=slice(first, last)).load()
-        data = part.to_netcdf(format=_NETCDF_3, engine="scipy", unlimited_dims=["point"])
-        return memoryview(data)
-
-    one = some(0, 1)
-    head = len(one) - _record_bytes(dataset)
+    layout = resized(bytes(tiny), {str(n): size for n, size in dataset.sizes.items()}, n_points)
+    tables = dataset.drop_vars("u", errors="ignore")
+    kind = _record_of(layout, tables)
+    begin = layout.places[kind.names[0]].begin if kind.names else len(layout.head)
+    step = max(1, _SLICE_BYTES // kind.itemsize)
     with path.open("wb") as file:
-        file.write(bytes(one[:4]) + n_points.to_bytes(4, "big") + bytes(one[8:head]))
-        for first in range(0, n_points, step):
-            file.write(some(first, first + step)[head:])
+        file.write(layout.head)
+        for name in tables.variables.keys() - set(kind.names or ()):
+            file.seek(layout.places[str(name)].begin)
+            file.write(_big_endian(tables[name].values).tobytes())
+        for start in range(0, n_points, step):
+            part = tables.isel(point=slice(start, start + step)).load()
+            records = np.zeros(part.sizes["point"], kind)
+            for name in kind.names or ():
+                records[name] = part[name].values
+            file.seek(begin + start * layout.record)
+            if series is None:
+                file.write(records.tobytes())
+                continue
+            for row, record in enumerate(records, start):
+                file.seek(begin + row * layout.record)
+                file.write(record.tobytes())
+                _write_series(file, begin + row * layout.record + kind.itemsize, series, row)
+        file.truncate(begin + n_points * layout.record)
 
 
-def _record_bytes(dataset: xr.Dataset) -> int:
-    """Return the bytes of one point; NetCDF 3 pads each variable to a multiple of four."""
-    points = [v for v in dataset.variables.values() if "point" in v.dims]
-    return sum(-(-v.nbytes // v.sizes["point"] // 4) * 4 for v in points)
+def _record_of(layout: Layout, tables: xr.Dataset) -> np.dtype[np.void]:
+    """Return the type of a record without u, which is its end."""
+    names = [str(name) for name, v in tables.variables.items() if "point" in v.dims]
+    places = {name: layout.places[name] for name in names}
+    first = min(place.begin for place in places.values())
+    size = layout.places["u"].begin - first if "u" in layout.places else layout.record
+    formats = [
+        (tables.variables[name].dtype.newbyteorder(">"), tables.variables[name].shape[1:])
+        for name in names
+    ]
+    offsets = [places[name].begin - first for name in names]
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+
+
+def _write_series(file: BinaryIO, begin: int, series: PackedSeries, point: int) -> None:
+    """Write u of a point from a place of the file on, a piece at a time."""
+    _, n_times, n_nodes = series.shape
+    for i, j in product(range(0, n_times, series.chunks[1]), range(0, n_nodes, series.chunks[2])):
+        times, nodes = (
+            slice(k, k + size) for k, size in zip((i, j), series.chunks[1:], strict=True)
+        )
+        part = _big_endian(series[point : point + 1, times, nodes][0])
+        data, row = memoryview(part.tobytes()), part[0].nbytes
+        size = len(data) if part.shape[1] == n_nodes else row
+        for start in range(0, len(data), size):
+            file.seek(begin + (i + start // row) * n_nodes * part.itemsize + j * part.itemsize)
+            file.write(data[start : start + size])
+
+
+def _big_endian(values: NDArray[Any]) -> NDArray[Any]:
+    return np.ascontiguousarray(values, values.dtype.newbyteorder(">"))
 
 
 def to_bundle(store: Store, target: Path, series: bool = False) -> None:

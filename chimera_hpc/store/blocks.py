@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,16 @@ from chimera_hpc.base.files import write_together
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.store.ledger import canonical, chunk_name, seal, sealed_size, unseal
-from chimera_hpc.store.schema import BLOCK_ARRAYS, MISSING, ArrayPlan, block_plans
+from chimera_hpc.store.schema import (
+    BLOCK_ARRAYS,
+    OPTIONAL,
+    ArrayPlan,
+    block_plans,
+    fill_of,
+    is_undivided,
+    series_plan,
+    state_width,
+)
 from chimera_hpc.store.template import create_array
 
 _INDEX_ENTRY = 16
@@ -57,25 +67,28 @@ class BlockFiles:
     `u` is missing where no series is kept, and what is `OPTIONAL` in a store of an older version.
     """
     series_dtype: str
+    piece: tuple[int, ...] = ()
+    """Times and nodes of an inner chunk of `u`."""
 
     @classmethod
-    def of(
-        cls,
-        path: Path,
-        sweep: Sweep,
-        block_size: int,
-        without: Collection[str] = (),
-        n_state: int = 0,
-    ) -> BlockFiles:
-        """Return the files of a sweep's store, which lacks the arrays `without`.
-
-        n_state: width of the array `state`.
-        """
-        planned = block_plans(sweep, block_size, block_size, n_state=n_state)
+    def of(cls, path: Path, sweep: Sweep, block_size: int, nodes: Mapping[str, Any]) -> BlockFiles:
+        """Return the files of a sweep's store; `nodes` are the metadata of its arrays."""
+        kept: dict[str, Any] = {"n_state": state_width(nodes), "undivided": is_undivided(nodes)}
+        planned = block_plans(sweep, block_size, block_size, **kept)
+        without = OPTIONAL - set(nodes)
         plans = {plan.name: plan for plan in planned}
         names = [name for name in BLOCK_ARRAYS if name in plans and name not in without]
-        shapes = {name: plans[name].chunks for name in names}
-        return cls(path, shapes, sweep.keep.dtype)
+        shapes = {name: plans[name].shape for name in names}
+        inner = plans["u"].inner if "u" in plans else None
+        return cls(path, shapes, sweep.keep.dtype, (inner or ())[1:])
+
+    @property
+    def pieces(self) -> tuple[int, int]:
+        """Into how many pieces the series of a point is cut, along time and along the nodes."""
+        n_times, n_nodes = (
+            -(-n // size) for n, size in zip(self.shapes["u"][1:], self.piece, strict=True)
+        )
+        return n_times, n_nodes
 
     def file(self, name: str, block: int) -> Path:
         return self.path / name / chunk_name(block, len(self.shapes[name]))
@@ -86,8 +99,7 @@ class BlockFiles:
             return np.full(self.shapes[name], Status.NEVER, dtype="<i8")
         if name != "u":
             return np.full(self.shapes[name], np.nan, dtype="<f8")
-        fill = MISSING if self.series_dtype == "int16" else np.nan
-        return np.full(self.shapes[name], fill, dtype=self.series_dtype)
+        return np.full(self.shapes[name], fill_of(self.series_dtype), dtype=self.series_dtype)
 
     def write(self, block: int, chunks: Mapping[str, NDArray[Any]]) -> int:
         """Write chunks by name of array, in this order; return their bytes when all are on disk."""
@@ -125,13 +137,17 @@ class BlockFiles:
             reason = "missing"
         return Damage(block, name, reason) if reason else None
 
-    def place_of_series(self, block: int, row: int) -> tuple[int, int] | None:
-        """Return where the series of a point is: offset and bytes; None where it is not kept."""
+    def places_of_series(self, block: int, row: int) -> dict[tuple[int, int], tuple[int, int]]:
+        """Return where the pieces of a point's series are: offset and bytes of those that are kept.
+
+        A piece is known by its number along time and along the nodes.
+        """
         with self.file("u", block).open("rb") as file:
             file.seek(-self._index_size(), 2)
-            index = np.frombuffer(file.read(), "<u8", count=2 * self.shapes["u"][0]).reshape(-1, 2)
-        offset, size = index[row].tolist()
-        return None if offset == _ABSENT else (offset, size)
+            index = np.frombuffer(file.read(), "<u8", count=self._index_entries() * 2)
+        places = index.reshape(-1, *self.pieces, 2)[row]
+        kept = np.argwhere(places[..., 0] != _ABSENT).tolist()
+        return {(i, j): (int(places[i, j, 0]), int(places[i, j, 1])) for i, j in kept}
 
     def _encode(self, name: str, chunk: NDArray[Any]) -> bytes:
         if name == "u":
@@ -153,7 +169,7 @@ class BlockFiles:
         chunk = files.get(self._series_key())
         if chunk is None:
             # Zarr writes no shard when no point has a series; ours says so in its index.
-            return seal(b"\xff" * (_INDEX_ENTRY * len(series)))
+            return seal(b"\xff" * (_INDEX_ENTRY * self._index_entries()))
         return chunk.to_bytes()
 
     def _decode_series(self, block: int, stored: bytes) -> NDArray[Any]:
@@ -172,14 +188,16 @@ class BlockFiles:
 
     def _series_plan(self) -> ArrayPlan:
         shape = self.shapes["u"]
-        fill = MISSING if self.series_dtype == "int16" else np.nan
-        return ArrayPlan("u", ("point", "time", "node"), shape, shape, self.series_dtype, fill, {})
+        return series_plan(shape, shape[0], self.series_dtype, self.piece)
 
     def _series_key(self) -> str:
         return f"u/{chunk_name(0, len(self.shapes['u']))}"
 
     def _index_size(self) -> int:
-        return sealed_size(_INDEX_ENTRY * self.shapes["u"][0])
+        return sealed_size(_INDEX_ENTRY * self._index_entries())
+
+    def _index_entries(self) -> int:
+        return self.shapes["u"][0] * math.prod(self.pieces)
 
     def _wrong_shard(self, tail: bytes, size: int) -> str:
         """Say what is wrong with a shard, by the index at its end; empty when nothing is."""

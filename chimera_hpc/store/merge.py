@@ -22,7 +22,7 @@ from chimera_hpc.job.points import point_keys
 from chimera_hpc.job.together import points_of
 from chimera_hpc.store.blocks import BlockFiles
 from chimera_hpc.store.extend import SAME_TABLES
-from chimera_hpc.store.ledger import FIELDS
+from chimera_hpc.store.ledger import FIELDS, read_metadata
 from chimera_hpc.store.runs import FOLDER as RUNS
 from chimera_hpc.store.runs import read_run, read_work, record_work, run_numbers
 from chimera_hpc.store.template import build, create_whole
@@ -116,8 +116,8 @@ class _Merge:
 
     def copy_blocks(self, path: Path, sweep: Sweep) -> None:
         size = self.stores[0].block_size
-        n_state = self.stores[0].n_state
-        files = BlockFiles.of(path, sweep, size, n_state=n_state)
+        nodes = read_metadata(path)["consolidated_metadata"]["metadata"]
+        files = BlockFiles.of(path, sweep, size, nodes)
         for block in range(-(-len(self.source) // size)):
             source = self.source[block * size : (block + 1) * size]
             if (source >= 0).any():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,10 @@ SCALE = 1e-4
 """Unit of the int16 series: u = SCALE * stored."""
 MISSING = -32768
 """Stored value of an int16 sample that is missing or beyond +-3.2767."""
+WHOLE_SERIES = 8_000_000
+"""Bytes of a point's series up to which it is one inner chunk."""
+SERIES_PIECE = 2_000_000
+"""Most bytes of an inner chunk of a larger series."""
 SMALL_FILE = 4096
 """Bytes that a metadata file takes, roughly."""
 _OTHER_FILES = 3
@@ -64,6 +68,8 @@ class ArrayPlan:
     dtype: str
     fill: float
     attributes: Mapping[str, Any]
+    inner: tuple[int, ...] | None = None
+    """Inner chunks; `chunks` are then shards, whole multiples of them, and may exceed `shape`."""
 
     @property
     def n_chunks(self) -> int:
@@ -116,6 +122,45 @@ def decode_series(stored: NDArray[Any]) -> NDArray[np.float64]:
     return np.where(stored == MISSING, np.nan, stored * SCALE)
 
 
+def series_plan(
+    shape: tuple[int, ...], block_size: int, dtype: str, piece: tuple[int, ...] | None = None
+) -> ArrayPlan:
+    """Return the array `u` of shape (points, times, nodes), without attributes.
+
+    piece: times and nodes of an inner chunk; default: as `series_piece` says.
+    """
+    n_times, n_nodes = piece or series_piece(shape[1], shape[2], np.dtype(dtype).itemsize)
+    chunks = (block_size, -(-shape[1] // n_times) * n_times, -(-shape[2] // n_nodes) * n_nodes)
+    dimensions = ("point", "time", "node")
+    inner = (1, n_times, n_nodes)
+    return ArrayPlan("u", dimensions, shape, chunks, dtype, fill_of(dtype), {}, inner)
+
+
+def fill_of(dtype: str) -> float:
+    """Return what stands for a missing sample in a series of this type."""
+    return MISSING if dtype == "int16" else math.nan
+
+
+def series_piece(n_times: int, n_nodes: int, itemsize: int) -> tuple[int, int]:
+    """Return times and nodes of an inner chunk of `u`.
+
+    A large series is cut about as often along time as along the nodes, so that one node and a
+    stretch of time are both read with a small part of the rest.
+    """
+    size = n_times * n_nodes * itemsize
+    if size <= WHOLE_SERIES:
+        return n_times, n_nodes
+    nodes = _even(n_nodes, n_nodes // math.ceil(math.sqrt(size / SERIES_PIECE)))
+    times = _even(n_times, SERIES_PIECE // (nodes * itemsize))
+    return times, _even(n_nodes, SERIES_PIECE // (times * itemsize))
+
+
+def _even(n: int, most: int) -> int:
+    """Return the length of as few equal parts of `n` as are no longer than `most`."""
+    parts = -(-n // max(1, most))
+    return -(-n // parts)
+
+
 def array_plans(
     sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int
 ) -> tuple[ArrayPlan, ...]:
@@ -137,11 +182,17 @@ def room(sweep: Sweep, columns: Mapping[str, NDArray[Any]], block_size: int) -> 
 
 
 def block_plans(
-    sweep: Sweep, n_points: int, block_size: int, coordinates: str = "", n_state: int = 0
+    sweep: Sweep,
+    n_points: int,
+    block_size: int,
+    coordinates: str = "",
+    n_state: int = 0,
+    undivided: bool = False,
 ) -> list[ArrayPlan]:
     """Return the arrays with one chunk per block, and `time` before them where series are kept.
 
     n_state: width of the array `state`, which sweeps with [continue] have.
+    undivided: each series is one inner chunk, however large, as in stores of earlier versions.
     """
 
     def plan(
@@ -201,13 +252,14 @@ def block_plans(
     if sweep.keep.series == "none":
         return tables
     times = sample_times(sweep)
-    series = plan(
-        "u",
-        (("time", len(times)), node),
-        sweep.keep.dtype,
-        MISSING if sweep.keep.dtype == "int16" else math.nan,
-        long_name="node variable u over the analysis interval",
-        **_series_attributes(sweep),
+    shape = (n_points, len(times), sweep.n_observed)
+    attributes = {"units": "1", "long_name": "node variable u over the analysis interval"}
+    attributes |= _series_attributes(sweep) | {"coordinates": coordinates}
+    piece = shape[1:] if undivided else None
+    series = replace(
+        series_plan(shape, block_size, sweep.keep.dtype, piece),
+        dimensions=("point", "time", node[0]),
+        attributes=attributes,
     )
     return [_time(times), series, *tables]
 
@@ -218,6 +270,22 @@ def state_width(nodes: Mapping[str, Any]) -> int:
         return int(nodes["state"]["shape"][1])
     except (KeyError, TypeError, ValueError, IndexError):
         return 0
+
+
+def inner_chunk(node: Mapping[str, Any]) -> tuple[int, ...] | None:
+    """Return the shape of an inner chunk by the metadata of an array; None if it has no shards."""
+    try:
+        return tuple(node["codecs"][0]["configuration"]["chunk_shape"])
+    except (KeyError, TypeError, IndexError):
+        return None
+
+
+def is_undivided(nodes: Mapping[str, Any]) -> bool:
+    """Whether each series is one inner chunk, by the metadata of a store."""
+    try:
+        return inner_chunk(nodes["u"]) == (1, *nodes["u"]["shape"][1:])
+    except (KeyError, TypeError):
+        return False
 
 
 def _series_attributes(sweep: Sweep) -> dict[str, Any]:

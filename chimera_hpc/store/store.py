@@ -37,7 +37,7 @@ from chimera_hpc.store.ledger import (
 from chimera_hpc.store.read import check_has_run, gather, read_series
 from chimera_hpc.store.reduction import StoredReduction, Variable, read_reduction, write_reduction
 from chimera_hpc.store.runs import start_run
-from chimera_hpc.store.schema import OPTIONAL, QUALITY, scalar_labels, series_mask, state_width
+from chimera_hpc.store.schema import QUALITY, scalar_labels, series_mask
 from chimera_hpc.store.strips import StoredSeries
 from chimera_hpc.store.template import check_root, consolidate, root_attributes, write_template
 from chimera_hpc.store.write import Receipt, write_block
@@ -63,9 +63,7 @@ class Store:
         self.sweep = sweep
         self.n_points, self.block_size = ledger_shape(metadata)
         nodes = metadata["consolidated_metadata"]["metadata"]
-        self.files = BlockFiles.of(
-            path, sweep, self.block_size, OPTIONAL - set(nodes), state_width(nodes)
-        )
+        self.files = BlockFiles.of(path, sweep, self.block_size, nodes)
 
     @classmethod
     def plan(cls, path: str | Path, sweep: Sweep) -> Self:

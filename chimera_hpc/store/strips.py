@@ -1,7 +1,7 @@
 """Some nodes of a stored series, without decoding the others.
 
-A series lies in its chunk node by node, compressed by Blosc in blocks of their own: a few blocks
-with a header of their own are a Blosc buffer again.
+A piece of a series lies in its chunk node by node, compressed by Blosc in blocks of their own: a
+few blocks with a header of their own are a Blosc buffer again.
 """
 
 from __future__ import annotations
@@ -9,16 +9,20 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import google_crc32c
 import numpy as np
 from numcodecs import Blosc
 from numpy.typing import NDArray
 
+from chimera_hpc.base.status import Status
 from chimera_hpc.store.blocks import BlockFiles, Damage, DamagedChunk
 from chimera_hpc.store.ledger import sealed_size
-from chimera_hpc.store.schema import decode_series
+from chimera_hpc.store.schema import decode_series, fill_of, series_mask
+
+if TYPE_CHECKING:
+    from chimera_hpc.store.store import Store
 
 _HEADER = struct.Struct("<4B3I")
 """Two versions, flags, bytes of a number; bytes of all, of a block, of the buffer."""
@@ -42,7 +46,7 @@ class StoredSeries:
     Raises
     ------
     DamagedChunk
-        The chunk is missing or damaged; its checksum is verified here.
+        The chunk is missing or cut short; a damaged piece of it raises this when it is read.
     """
 
     def __init__(self, files: BlockFiles, point: int, size: int | None = None) -> None:
@@ -52,38 +56,96 @@ class StoredSeries:
             raise DamagedChunk(damage)
         _, n_times, n_nodes = files.shapes["u"]
         self.shape = (n_nodes if size is None else size, n_times)
+        self._piece = files.piece
         self._type = np.dtype(files.series_dtype)
+        self._fill = fill_of(files.series_dtype)
         self._path: Path = files.file("u", self._block)
-        self._buffer = self._open(files.place_of_series(self._block, row))
+        self._places = files.places_of_series(self._block, row)
+        self._opened: dict[tuple[int, int], _Buffer] = {}
 
     def __getitem__(self, nodes: slice) -> NDArray[np.float64]:
         """Return u of these nodes, (nodes, T); NaN where a sample is missing."""
         first, last, step = nodes.indices(self.shape[0])
-        pieces = [(first, last)] if step == 1 else [(i, i + 1) for i in range(first, last, step)]
-        count = len(range(first, last, step))
-        if not count or self._buffer is None:
-            return np.full((count, self.shape[1]), np.nan)
-        with self._path.open("rb") as file:
-            return np.concatenate([self._read(file, *piece) for piece in pieces])
+        strips = [(first, last)] if step == 1 else [(i, i + 1) for i in range(first, last, step)]
+        parts = [self.packed((0, self.shape[1]), strip) for strip in strips]
+        return decode_series(np.concatenate([np.empty((0, self.shape[1]), self._type), *parts]))
 
-    def _read(self, file: BinaryIO, first: int, last: int) -> NDArray[np.float64]:
-        assert self._buffer is not None
-        row = self.shape[1] * self._type.itemsize
+    def packed(self, times: tuple[int, int], nodes: tuple[int, int]) -> NDArray[Any]:
+        """Return u as it is stored, (nodes, times), from the first time and node to the last."""
+        found = np.full((nodes[1] - nodes[0], times[1] - times[0]), self._fill, self._type)
+        with self._path.open("rb") as file:
+            for i, j in self._places:
+                columns, inner_columns = _overlap(times, i, self._piece[0])
+                rows, inner_rows = _overlap(nodes, j, self._piece[1])
+                part = found[rows, columns]
+                if part.size:
+                    data = self._read(file, (i, j), inner_rows)
+                    part[:] = data[:, inner_columns]
+        return found
+
+    def _read(self, file: BinaryIO, piece: tuple[int, int], nodes: slice) -> NDArray[Any]:
+        buffer, row = self._open(file, piece), self._piece[0] * self._type.itemsize
         try:
-            data = self._buffer.part(file, first * row, last * row)
+            data = buffer.part(file, nodes.start * row, nodes.stop * row)
         except (RuntimeError, ValueError) as error:
-            reason = f"nodes {first} to {last - 1} cannot be decoded ({error})"
+            reason = f"piece {piece} of a series cannot be decoded ({error})"
             raise DamagedChunk(Damage(self._block, "u", reason)) from None
-        return decode_series(np.frombuffer(data, self._type).reshape(last - first, -1))
+        return np.frombuffer(data, self._type).reshape(nodes.stop - nodes.start, -1)
 
-    def _open(self, place: tuple[int, int] | None) -> _Buffer | None:
-        if place is None:
-            return None
-        offset, size = place[0], place[1] - sealed_size(0)
-        with self._path.open("rb") as file:
+    def _open(self, file: BinaryIO, piece: tuple[int, int]) -> _Buffer:
+        if piece not in self._opened:
+            offset, size = self._places[piece]
+            size -= sealed_size(0)
             if _checksum(file, offset, size) != file.read(sealed_size(0)):
                 raise DamagedChunk(Damage(self._block, "u", "wrong checksum"))
-            return _Buffer(file, offset, size)
+            self._opened[piece] = _Buffer(file, offset, size)
+        return self._opened[piece]
+
+
+class PackedSeries:
+    """u of all points as it is stored, read a part at a time: ``series[points, times, nodes]``.
+
+    The slices have the step 1. Points whose series is not kept, or that never ran, are missing.
+
+    Attributes
+    ----------
+    shape, dtype, ndim
+        As of the array `u`, (points, T, N).
+    chunks : tuple of int
+        What is best read at a time: at most about `PackedSeries.MOST` bytes.
+    """
+
+    MOST = 32_000_000
+    ndim = 3
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._kept = series_mask(store.sweep, store.points.columns["seed"])
+        self._kept &= store.ledger()["status"] != Status.NEVER
+        self.shape = (store.n_points, *store.files.shapes["u"][1:])
+        self.dtype = np.dtype(store.files.series_dtype)
+        n_times, n_nodes = store.files.piece
+        most = max(1, self.MOST // (n_times * self.dtype.itemsize))
+        self.chunks = (1, n_times, min(n_nodes, most))
+        self._last: tuple[int, StoredSeries] | None = None
+
+    def __getitem__(self, parts: tuple[slice, slice, slice]) -> NDArray[Any]:
+        points, times, nodes = (
+            (first, last)
+            for first, last, _ in (p.indices(n) for p, n in zip(parts, self.shape, strict=True))
+        )
+        shape = (points[1] - points[0], times[1] - times[0], nodes[1] - nodes[0])
+        found = np.full(shape, fill_of(self.dtype.name), self.dtype)
+        for row, i in enumerate(range(*points)):
+            if self._kept[i]:
+                found[row] = self._series(i).packed(times, nodes).T
+        return found
+
+    def _series(self, i: int) -> StoredSeries:
+        # It knows which checksums hold.
+        if self._last is None or self._last[0] != i:
+            self._last = (i, StoredSeries(self._store.files, i))
+        return self._last[1]
 
 
 class _Buffer:
@@ -134,3 +196,11 @@ def _checksum(file: BinaryIO, offset: int, size: int) -> bytes:
         checksum = google_crc32c.extend(checksum, data)
         size -= len(data)
     return checksum.to_bytes(4, "little")
+
+
+def _overlap(wanted: tuple[int, int], number: int, size: int) -> tuple[slice, slice]:
+    """Return where the piece of this number lies in what is wanted, and that part in the piece."""
+    begin = number * size
+    first, last = max(wanted[0], begin), min(wanted[1], begin + size)
+    last = max(first, last)
+    return slice(first - wanted[0], last - wanted[0]), slice(first - begin, last - begin)

@@ -42,6 +42,8 @@ from chimera_hpc.store.schema import (
     ArrayPlan,
     array_plans,
     block_plans,
+    inner_chunk,
+    is_undivided,
     sample_times,
     state_width,
 )
@@ -144,8 +146,8 @@ def check_root(path: Path, root: Mapping[str, Any], origin: Origin | None = None
         Sweep.from_dict(spec, str(path), origin)
     n_points = attributes["n_points"]
     damaged = [name for name, node in nodes.items() if not _is_sound(name, node, n_points)]
-    n_state = state_width(nodes)
-    for plan in block_plans(sweep, n_points, attributes["block_size"], n_state=n_state):
+    kept: dict[str, Any] = {"n_state": state_width(nodes), "undivided": is_undivided(nodes)}
+    for plan in block_plans(sweep, n_points, attributes["block_size"], **kept):
         missing = plan.name in OPTIONAL and plan.name not in nodes
         if not missing and not _matches(nodes.get(plan.name), plan):
             damaged.append(plan.name)
@@ -157,10 +159,10 @@ def check_root(path: Path, root: Mapping[str, Any], origin: Origin | None = None
 def create_array(store: StoreLike, plan: ArrayPlan) -> zarr.Array[Any]:
     """Create an empty array as planned, with a checksum in every chunk, inside shards too."""
     options: dict[str, Any] = {"chunks": plan.chunks, "filters": None}
-    if plan.name == "u":
+    if plan.inner is not None:
         # Time runs fastest and the bytes of a number are split, else hardly anything is gained.
         shuffled = BloscCodec(cname="lz4", clevel=5, shuffle="shuffle")
-        options = {"chunks": (1, *plan.chunks[1:]), "shards": plan.chunks}
+        options = {"chunks": plan.inner, "shards": plan.chunks}
         options["filters"] = [TransposeCodec(order=(0, 2, 1))]
         options["compressors"] = [shuffled, Crc32cCodec()]
     elif plan.name in BLOCK_ARRAYS:
@@ -226,7 +228,8 @@ def _matches(node: Any, plan: ArrayPlan) -> bool:
         found = (tuple(node["shape"]), tuple(chunks), node["data_type"], node["dimension_names"])
     except (KeyError, TypeError):
         return False
-    return found == (plan.shape, plan.chunks, plan.dtype, list(plan.dimensions))
+    wanted = (plan.shape, plan.chunks, plan.dtype, list(plan.dimensions))
+    return found == wanted and plan.inner in (None, inner_chunk(node))
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:

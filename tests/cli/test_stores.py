@@ -19,6 +19,7 @@ from jobs_for_tests import SMALL, job_text
 import chimera_hpc
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
+from chimera_hpc.store.block_result import failed_block
 from chimera_hpc.store.ledger import FIELDS, point_digest, read_ledger
 from chimera_hpc.store.store import Store
 
@@ -428,6 +429,39 @@ def test_netcdf_3_written_in_pieces_holds_the_same(
         assert "chimera" in pieces["class_3"]
         assert packed["u"].dtype == np.int16
         assert packed["u"].attrs["_FillValue"].dtype == np.int16
+
+
+@pytest.mark.parametrize("undivided", [False, True])
+def test_large_series_are_exported_in_parts(
+    undivided: bool, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("chimera_hpc.reduction.export._NETCDF_4", ())
+    monkeypatch.setattr("chimera_hpc.store.strips.PackedSeries.MOST", 30_000)
+    if not undivided:
+        monkeypatch.setattr("chimera_hpc.store.schema.WHOLE_SERIES", 20_000)
+        monkeypatch.setattr("chimera_hpc.store.schema.SERIES_PIECE", 5_000)
+    settings = {"grid.P": 3, "grid.seeds": 3, "fixed.n_nodes": 101, "keep.series": "all"}
+    store = Store.plan(tmp_path / "store.zarr", Sweep.from_toml_text(job_text(SMALL, settings)))
+    result = failed_block(store.sweep, store.block_points(0), Status.DONE)
+    assert result.series is not None
+    shape = result.series.shape
+    result.series[:] = np.random.default_rng(0).integers(-3000, 3000, shape)
+    store.write_block(0, result, 1, 1, rows=range(shape[0]))
+    assert sweep("export", tmp_path, "--to", tmp_path / "u.nc", "--series")[0] == 0
+    with xr.open_dataset(tmp_path / "u.nc", mask_and_scale=False) as dataset:
+        np.testing.assert_array_equal(dataset["u"][: shape[0]], result.series)
+        assert dataset["u"].dims == ("point", "time", "node")
+        assert dataset["time"].values[-1] == pytest.approx(60.0)
+
+
+def test_series_that_are_not_kept_are_not_exported(tmp_path: Path, sweep: Run) -> None:
+    Store.plan(
+        tmp_path / "store.zarr", Sweep.from_toml_text(job_text(SMALL, {"keep.series": "none"}))
+    )
+    status, _, said = sweep("export", tmp_path, "--to", tmp_path / "u.nc", "--series")
+    assert status == 2
+    assert "holds no series" in said
+    assert not (tmp_path / "u.nc").exists()
 
 
 def test_table_written_in_pieces_is_the_same(
