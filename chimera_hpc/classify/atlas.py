@@ -41,6 +41,11 @@ class Atlas:
     """(m,): class of each training point."""
     names: tuple[str, ...]
 
+    @property
+    def sizes(self) -> Integers:
+        """(n_classes,): training points of each class."""
+        return np.bincount(self.labels, minlength=len(self.names))
+
     @classmethod
     def of(cls, classification: Classification, cut: Cut | None = None) -> Atlas:
         """Return the atlas of one cut (default: the base cut) over the leaves of the tree."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -30,8 +30,10 @@ class Decide(Table):
     first: Runs = Field(5, description="Seeds that every cell gets.")
     batch: Runs = Field(5, description="Further seeds per round of a cell that is not decided.")
     most: Runs = Field(100, description="Most seeds of a cell; one still open then is undecided.")
-    judge: Literal["frozen"] = Field(
-        "frozen", description="Classes come from the tree over the runs of the first round."
+    judge: Literal["frozen", "atlas"] = Field(
+        "frozen",
+        description="frozen: classes come from the tree over the runs of the first round; atlas: "
+        "from the first sweep in reduction.atlas.",
     )
     refine: dict[str, int | float] = Field(
         default_factory=dict,
@@ -62,6 +64,13 @@ class Decide(Table):
             if whole and not isinstance(distance, int):
                 text = f"{short(distance)} is not an integer, as the values of {name} are"
                 raise BadInput(f"decide.refine.{name}: {text}")
+
+    def check_judge(self, atlas: Sequence[str]) -> None:
+        """Raise BadInput when an atlas judges and reduction.atlas names none."""
+        if self.judge == "atlas" and not atlas:
+            raise BadInput(
+                'decide.judge: "atlas", but reduction.atlas names no sweep whose classes judge'
+            )
 
     def full_grid(self, axes: Mapping[str, Axis], n_cells: int) -> int:
         """Return the runs of a full grid: `n_cells`, each refined axis filled, `most` seeds each.

@@ -342,6 +342,7 @@ class Sweep(Table):
             check_added(model, axes, self.fixed, self.added)
         if self.decide is not None:
             self.decide.check_axes(axes)
+            self.decide.check_judge(self.reduction.atlas)
             if self.continue_ is not None:
                 raise BadInput("decide: not with [continue], whose seeds are whole chains")
         if self.continue_ is not None and (self.decide or self.added) is not None:

@@ -10,6 +10,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.reduction.conventions import OWN, stored_reduction
 from chimera_hpc.reduction.results import read_results
+from chimera_hpc.store.reduction import sibling
 
 
 def load_atlas(folder: str | Path, convention: str = OWN) -> Atlas:
@@ -45,12 +46,6 @@ def atlases_of(
         else:
             found[name] = atlas
     return found
-
-
-def sibling(folder: Path, name: str) -> Path:
-    """Return the folder that a name stands for: next to the sweep's own, or a path as it is."""
-    path = Path(name)
-    return path if path.is_absolute() or len(path.parts) > 1 else folder.absolute().parent / name
 
 
 def curves_beside(

@@ -8,27 +8,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.boundaries import boundaries
 from chimera_hpc.classify.classification import Cut
 from chimera_hpc.classify.modes import count_votes, modal_labels, vote_labels
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.axes import Same
 from chimera_hpc.reduction.cells import FreeAxis, describe
-from chimera_hpc.run.rounds import Standing, standing
+from chimera_hpc.run.rounds import Standing, judged
 from chimera_hpc.store.store import Store
 
 MOST_LINES = 20
 """Boundaries that are printed one by one."""
 
 
-def decided_results(store: Store, cut: Cut, status: NDArray[np.int64]) -> dict[str, Any]:
+def decided_results(
+    store: Store,
+    cut: Cut,
+    status: NDArray[np.int64],
+    triplets: NDArray[np.float64],
+    atlases: Mapping[str, Atlas],
+) -> dict[str, Any]:
     """Return ``decide`` and ``boundaries`` of results.json; empty for a job without [decide].
 
-    cut: that of the tree over all runs, with which the frozen judge is compared.
+    Also empty while the atlas that judges is missing. Under another convention than the sweep's
+    own, the votes are those of that convention, of the runs that the own one asked for.
+
+    cut: that of the tree over all runs, with which the judge is compared.
     """
-    now = standing(store)
-    if now is None:
+    sweep, atlas = store.sweep, None
+    if sweep.decide is None:
         return {}
+    if sweep.decide.judge == "atlas":
+        atlas = atlases.get(sweep.reduction.atlas[0])
+        if atlas is None:
+            return {}
+    n_first = len(store.sweeps[0].points())
+    now = judged(sweep, store.points, triplets, status, n_first, atlas)
     found = now.found
     names = now.names
     cells = [

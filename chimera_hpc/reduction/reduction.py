@@ -172,10 +172,10 @@ class _Work:
             *tree_warnings(made),
         ]
         self.curves = self.results["curves"]
-        if self.convention == OWN:
-            self.decided = json_safe(decided_results(store, made.cuts[self.cuts[0]], self.status))
-        self.results |= self.decided
         cut = made.cuts[self.cuts[0]]
+        found = decided_results(store, cut, self.status, self.triplets, self.atlases)
+        self.decided = json_safe(found)
+        self.results |= self.decided
         names = run_names(cut.labels, self.status, cut.names)
         self.chains = json_safe(chain_results(store, names, self.scalars))
         self.results |= self.chains

@@ -134,6 +134,13 @@ class Driver:
         )
         return True
 
+    def _check_judge(self) -> None:
+        """Raise BadInput, before anything is computed, when the atlas that judges is missing."""
+        if self.store.sweep.decide is not None:
+            from chimera_hpc.run.judge import other_judge
+
+            other_judge(self.store)
+
     def _count(self) -> None:
         """Have the reporter count what the ledger says, by whichever run."""
         retry, ledger = self.retry, self.store.ledger()
@@ -147,6 +154,7 @@ class Driver:
         try:
             for line in store.repair():
                 say(line)
+            self._check_judge()
             blocks = self.pending()
             if not blocks and self.next_round():
                 blocks = self.pending()

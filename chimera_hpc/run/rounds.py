@@ -1,6 +1,7 @@
 """The rounds of a sweep with [decide]: how far its cells are decided, and what comes next.
 
-The next round is a pure function of what the store holds: its ledger, its features and its specs.
+The next round is a pure function of what the store holds: its ledger, its features and its specs,
+and of the atlas where one judges.
 So a run that was killed chooses the same points again, and so does another process.
 """
 
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,24 +17,16 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.boundaries import new_cells
-from chimera_hpc.classify.classification import (
-    TRIPLET,
-    Classification,
-    Cut,
-    classify,
-    has_triplet,
-)
+from chimera_hpc.classify.classification import TRIPLET, has_triplet
 from chimera_hpc.classify.deciding import SILENT, Decisions, decisions, expected_runs
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY, count_votes, vote_labels
-from chimera_hpc.classify.naming import Rule
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.added import SEEDS
 from chimera_hpc.job.axes import Same
-from chimera_hpc.job.class_names import naming_rule
 from chimera_hpc.job.decide import Decide
 from chimera_hpc.job.points import dependency_order
-from chimera_hpc.job.tables import Reduction
 from chimera_hpc.models.parameters import Column
+from chimera_hpc.run.judge import frozen_judge, other_judge
 from chimera_hpc.store.store import Store
 
 
@@ -50,8 +43,8 @@ class Standing:
     n_grid: int
     """Number of cells of the first round; the others come behind."""
     runs: NDArray[np.int64]
-    judge: Cut
-    """The classes of the first round's tree."""
+    judge: Atlas
+    """What gives the runs their classes: that of the first round's tree, or another sweep's."""
     labels: NDArray[np.int64]
     """(n_points,) class of each run by the judge, -1 where it has none."""
     votes: NDArray[np.int64]
@@ -91,7 +84,8 @@ def standing(store: Store) -> Standing | None:
     scalars = store.scalars()
     triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
     n_first = len(store.sweeps[0].points())
-    return judged(store.sweep, store.points, triplets, store.ledger()["status"], n_first)
+    status = store.ledger()["status"]
+    return judged(store.sweep, store.points, triplets, status, n_first, other_judge(store))
 
 
 def judged(
@@ -100,13 +94,15 @@ def judged(
     triplets: NDArray[np.float64],
     status: NDArray[np.int64],
     n_first: int,
+    atlas: Atlas | None = None,
 ) -> Standing:
-    """Judge runs by the tree over the first `n_first` of them.
+    """Judge runs by an atlas, or by the tree over the first `n_first` of them.
 
     triplets: (n_points, 3); NaN where a run has none.
     """
     assert sweep.decide is not None
-    judge, labels = _frozen(sweep, triplets, status, n_first)
+    judge = atlas or frozen_judge(sweep, triplets, status, n_first)
+    labels = np.where(has_triplet(triplets, status), judge.classify(triplets).label, -1)
     cell, columns = points.cells()
     votes = vote_labels(labels, status, len(judge.names))
     axes = tuple(name for name in points.axes if name != "seed")
@@ -123,32 +119,6 @@ def judged(
         judge=judge,
         labels=labels,
         votes=np.pad(table, ((0, 0), (0, missing))),
-    )
-
-
-def _frozen(
-    sweep: Sweep, triplets: NDArray[np.float64], status: NDArray[np.int64], n_first: int
-) -> tuple[Cut, NDArray[np.int64]]:
-    """Return the first cut of the first round's tree, and the class of every run by it."""
-    spec, first = sweep.reduction, slice(n_first)
-    rule = naming_rule(sweep)
-    made = _first_tree(triplets[first].tobytes(), status[first].tobytes(), spec, rule)
-    cut = made.cuts[spec.cuts[0]] if spec.cuts else next(iter(made.cuts.values()))
-    found = Atlas.of(made, cut).classify(triplets).label
-    return cut, np.where(has_triplet(triplets, status), found, -1)
-
-
-@lru_cache(maxsize=1)
-def _first_tree(triplets: bytes, status: bytes, spec: Reduction, rule: Rule) -> Classification:
-    """Return the tree of the first round, whose runs are the same in every round."""
-    return classify(
-        np.frombuffer(triplets).reshape(-1, 3),
-        np.frombuffer(status, dtype=np.int64),
-        linkage=spec.linkage,
-        classifier=spec.classifier,
-        cuts=spec.cuts,
-        depth=spec.depth,
-        names=rule,
     )
 
 

@@ -32,6 +32,12 @@ class StoredReduction:
     attributes: dict[str, Any]
 
 
+def sibling(folder: Path, name: str) -> Path:
+    """Return the folder that a name stands for: next to the sweep's own, or a path as it is."""
+    path = Path(name)
+    return path if path.is_absolute() or len(path.parts) > 1 else folder.absolute().parent / name
+
+
 def write_reduction(
     path: Path, variables: Mapping[str, Variable], attributes: Mapping[str, Any]
 ) -> None:

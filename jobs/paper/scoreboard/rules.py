@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from chimera_hpc.classify.robustness import wilson_interval
+from scoreboard.decided import decided_cells, outcome_of
 from scoreboard.evidence import (
     Cell,
     Evidence,
@@ -296,6 +297,21 @@ def _axis(cells: Sequence[Cell]) -> str:
     return varying[0] if varying else "P"
 
 
+def decided(
+    evidence: Evidence, job: str, where: Cell, axis: str, is_class: str, exceptions: int = 0
+) -> Finding:
+    """Cells with seeds until they are decided are of a class, with so many exceptions.
+
+    It cannot be decided where cells that are still open tip it. Steady runs count as ordered.
+    """
+    right, wrong, still_open, text = decided_cells(evidence, job, where, axis, is_class)
+    holds = outcome_of(wrong, still_open, exceptions)
+    total = right + wrong + still_open
+    if holds is None:
+        return Finding(NOT_DECIDABLE, f"{right} of {total}, {still_open} open: {text}")
+    return share(holds, right, total, text)
+
+
 def share_of_chimeras(
     evidence: Evidence,
     job: str,
@@ -413,6 +429,7 @@ RULES: dict[str, Rule] = {
         radii_compare,
         basins_agree,
         judged,
+        decided,
         transition,
         extreme_is,
         share_of_chimeras,

@@ -1,0 +1,67 @@
+"""The judge of a sweep with [decide]: the classes of its runs while it goes on.
+
+It does not change from round to round, so the class of a run never does either.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chimera_hpc.base.errors import BadInput
+from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.classification import classify
+from chimera_hpc.classify.naming import Rule
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.class_names import naming_rule
+from chimera_hpc.job.tables import Reduction
+from chimera_hpc.store.labelled import STORE_NAME
+from chimera_hpc.store.reduction import sibling
+from chimera_hpc.store.store import Store
+
+
+def other_judge(store: Store) -> Atlas | None:
+    """Return the first atlas that the job names; None when the first round judges.
+
+    Raises BadInput: the sweep of that name is not there, or has not been reduced.
+    """
+    decide, names = store.sweep.decide, store.sweep.reduction.atlas
+    if decide is None or decide.judge != "atlas":
+        return None
+    place = sibling(store.path.parent, names[0])
+    try:
+        stored = Store.open(place / STORE_NAME).reduction()
+        atlas = Atlas.from_arrays(stored.arrays, stored.attributes)
+    except BadInput as error:
+        raise BadInput(f"decide.judge: atlas {names[0]}: {error}") from None
+    if not atlas.names:
+        raise BadInput(f"decide.judge: atlas {names[0]}: {place} has no classes")
+    return atlas
+
+
+def frozen_judge(
+    sweep: Sweep, triplets: NDArray[np.float64], status: NDArray[np.int64], n_first: int
+) -> Atlas:
+    """Return the classes of the tree over the first `n_first` runs, in the first cut."""
+    first = slice(n_first)
+    return _first_tree(
+        triplets[first].tobytes(), status[first].tobytes(), sweep.reduction, naming_rule(sweep)
+    )
+
+
+@lru_cache(maxsize=1)
+def _first_tree(triplets: bytes, status: bytes, spec: Reduction, rule: Rule) -> Atlas:
+    """Return the atlas of the first round, whose runs are the same in every round."""
+    made = classify(
+        np.frombuffer(triplets).reshape(-1, 3),
+        np.frombuffer(status, dtype=np.int64),
+        linkage=spec.linkage,
+        classifier=spec.classifier,
+        cuts=spec.cuts,
+        depth=spec.depth,
+        names=rule,
+    )
+    cut = made.cuts[spec.cuts[0]] if spec.cuts else next(iter(made.cuts.values()))
+    return Atlas.of(made, cut)
