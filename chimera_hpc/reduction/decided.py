@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.classify.atlas import Atlas
-from chimera_hpc.classify.boundaries import boundaries
+from chimera_hpc.classify.boundaries import Boundary, boundaries
 from chimera_hpc.classify.classification import Cut
+from chimera_hpc.classify.crossing import crossing
 from chimera_hpc.classify.modes import count_votes, modal_labels, vote_labels
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.axes import Same
+from chimera_hpc.models.parameters import Column
 from chimera_hpc.reduction.cells import FreeAxis, describe
 from chimera_hpc.run.rounds import Standing, judged
 from chimera_hpc.store.store import Store
@@ -102,7 +104,18 @@ def _boundaries(now: Standing, sweep: Sweep) -> Iterator[dict[str, Any]]:
                 "between": [now.names[now.classes[i]] for i in (low, high)],
                 "at": sum(interval) / 2,
                 "interval": interval,
+                "crossing": _crossing(now, boundary, free[axis]),
             }
+
+
+def _crossing(now: Standing, boundary: Boundary, values: Column) -> dict[str, Any] | None:
+    """Return where the votes cross; None without undecided cells between the two decided ones."""
+    cells = list(boundary.cells)
+    if len(cells) == 2:
+        return None
+    below, above = (now.votes[cells, now.classes[end]] for end in boundary.ends)
+    at, low, high = crossing(values[cells], below, above, now.decide.confidence)
+    return {"at": at, "interval": [low, high]}
 
 
 def _roots(sweep: Sweep, name: str) -> tuple[str, ...]:
@@ -146,4 +159,7 @@ def boundary_line(boundary: Mapping[str, Any], axes: list[FreeAxis]) -> str:
     where = describe(boundary, rest)
     low, high = boundary["interval"]
     text = f"{boundary['axis']} = {boundary['at']:.6g} ({low:.6g} to {high:.6g})"
+    if (cross := boundary["crossing"]) is not None:
+        low, high = cross["interval"]
+        text += f", votes cross at {cross['at']:.6g} ({low:.6g} to {high:.6g})"
     return f"{text}: {' | '.join(boundary['between'])}" + (f" at {where}" if where else "")

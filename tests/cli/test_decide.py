@@ -7,13 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from jobs_for_tests import SMALL, job_text
 
-from chimera_hpc.classify.classification import Classification, Cut
+from chimera_hpc.base.status import Status
+from chimera_hpc.classify.atlas import UNCLASSIFIED
+from chimera_hpc.classify.classification import TRIPLET, Classification, Cut
 from chimera_hpc.job.points import point_keys
 from chimera_hpc.plot.boundaries import boundaries_figure
 from chimera_hpc.plot.figure_input import FigureInput
+from chimera_hpc.reduction.atlases import load_atlas
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.page import page as report_of
 from chimera_hpc.store.store import Store
@@ -72,6 +76,8 @@ def test_results_hold_cells_and_boundaries(decided):
         assert boundary["between"] == ends
         assert ends[0] != ends[1]
         assert boundary["at"] == (low + high) / 2
+        if (cross := boundary["crossing"]) is not None:
+            assert low <= cross["interval"][0] <= cross["at"] <= cross["interval"][1] <= high
         inner = [P for (P, Q) in classes if boundary["Q"] == Q and low < P < high]
         assert boundary["axis"] == "P"
         assert inner == []
@@ -125,6 +131,28 @@ def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
     assert code == 0
     assert same(tmp_path / "sweep", decided / "sweep")
     assert results(tmp_path / "sweep")["decide"] == results(decided / "sweep")["decide"]
+
+
+def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
+    job = ("run", decided / "job.toml", "--cluster", "serial", "--no-figures")
+    few = ("Q=0", "decide.first=2", "decide.batch=2", "decide.most=4", "decide.refine={}")
+    changes = [word for text in (*few, 'decide.judge="atlas"') for word in ("--set", text)]
+    code, _, err = sweep(*job, *changes, "--out", decided / "lost", "--set", 'atlas="none"')
+    assert code == 2
+    assert "decide.judge: atlas none: " in err
+    lost = Store.open(decided / "lost" / "store.zarr").ledger()["status"]
+    assert (lost == Status.NEVER).all()
+    code, _, _ = sweep(*job, *changes, "--out", decided / "judged", "--set", 'atlas="sweep"')
+    assert code == 0
+    store = Store.open(decided / "judged" / "store.zarr")
+    atlas = load_atlas(decided / "sweep")
+    scalars = store.scalars()
+    triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
+    named = np.array(atlas.classify(triplets).name)
+    for cell, rows in zip(results(decided / "judged")["decide"]["cells"], (0, 1), strict=True):
+        mine = named[(store.points.cells()[0] == rows) & (named != UNCLASSIFIED)].tolist()
+        assert cell["runs"] in (2, 4)
+        assert cell["class"] == "steady" or mine.count(cell["class"]) == max(map(mine.count, mine))
 
 
 def test_report_tells_decided_cells(decided):

@@ -58,6 +58,7 @@ def test_full_grid_is_refined_everywhere():
         ({"decide.refine": {"p": 1}}, "decide.refine.p: not an axis in [grid]; known: P, Q"),
         ({"decide.refine": {"P": 0}}, "decide.refine.P: 0 is not above 0"),
         ({"decide.judge": "all"}, "decide.judge = 'all'"),
+        ({"decide.judge": "atlas"}, "reduction.atlas names no sweep whose classes judge"),
         ({"added.P": [3], "added.seeds": [3]}, "added.Q: missing"),
         ({"added.P": [3], "added.Q": [2, 3], "added.seeds": [1]}, "must be equally long"),
         ({"added.P": [3, 3], "added.Q": [1, 1], "added.seeds": [1, 2]}, "a cell is there twice"),
