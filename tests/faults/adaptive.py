@@ -1,0 +1,139 @@
+"""Kill the rounds of a sweep with [decide] again and again, and compare its end with another one.
+
+    python tests/faults/adaptive.py --kills 20              # run with two workers
+    python tests/faults/adaptive.py --kills 20 --slurm      # a job array of two, by a real SLURM
+
+The undisturbed sweep is run by one process. Locally every second kill takes the driver alone, the
+others its workers too. Of an array one element is killed at a time, and submitted again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from slurm_real import Slurm
+from slurm_sweeps import command, sweep
+
+from chimera_hpc.job.points import point_keys
+from chimera_hpc.store.store import Store
+
+JOB = """
+name = "adaptive"
+model = "topological_fhn"
+[grid]
+P = 10
+Q = "4:7"
+[reduction]
+figures = []
+[keep]
+series = "none"
+[run]
+block = 2
+[decide]
+confidence = 0.99
+first = 5
+batch = 5
+most = 150
+[slurm]
+interface = "lo"
+mem = "900M"
+time = "30"
+"""
+
+
+def same(folder: Path, other: Path) -> bool:
+    """Return whether two sweeps have the same points, digests, and rounds in the last spec."""
+    ours, theirs = (Store.open(place / "store.zarr") for place in (folder, other))
+    keys = point_keys(ours.points).tolist() == point_keys(theirs.points).tolist()
+    digests = ours.ledger()["digest"].tolist() == theirs.ledger()["digest"].tolist()
+    return keys and digests and ours.sweep.digest == theirs.sweep.digest
+
+
+def state(folder: Path) -> str:
+    """Return rounds, points and computed points of a sweep."""
+    try:
+        store = Store.open(folder / "store.zarr")
+        done = int((store.ledger()["status"] != 255).sum())
+    except Exception as error:
+        return str(error)
+    return f"round {len(store.sweeps)}, {done} of {store.n_points} points"
+
+
+def killed_here(job: Path, out: Path, kills: int, chance: random.Random) -> int:
+    """Run with two workers until it ends; return how many kills it took."""
+    words = command("run", job, "--out", out, "--workers", "2", "--no-figures")
+    for kill in range(kills):
+        with (out.parent / "run.log").open("ab") as log:
+            process = subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True)
+        try:
+            process.wait(chance.uniform(2.0, 12.0))
+        except subprocess.TimeoutExpired:
+            (os.kill if kill % 2 else os.killpg)(process.pid, signal.SIGKILL)
+            process.wait()
+        else:
+            return kill
+        print(f"kill {kill + 1}: {state(out)}", flush=True)
+    return kills
+
+
+def killed_elements(slurm: Slurm, job: Path, out: Path, kills: int, chance: random.Random) -> int:
+    """Run a job array of two elements until it ends; return how many were killed."""
+    words = ("slurm", job, "--out", out, "--mode", "array", "--array", 2, "--no-reduce", "--submit")
+    done = sweep(*words)
+    print(done.stdout, done.stderr)
+    for kill in range(kills):
+        time.sleep(chance.uniform(2.0, 10.0))
+        elements = [line[0] for line in slurm.queue() if line[1] == "RUNNING"]
+        if not elements:
+            return kill
+        element = chance.choice(elements)
+        slurm.sh("scancel", "--signal=KILL", "--full", element)
+        slurm.until(lambda lost=element: lost not in _running(slurm), 60, "the element did not end")
+        print(f"kill {kill + 1} of {element}: {state(out)}", flush=True)
+        slurm.sh("sbatch", f"--array={element.split('_')[1]}", str(out / "slurm" / "array.sbatch"))
+    return kills
+
+
+def _running(slurm: Slurm) -> list[str]:
+    return [line[0] for line in slurm.queue()]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--slurm", action="store_true")
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    folder, chance = Path(tempfile.mkdtemp(prefix="adaptive-")), random.Random(args.seed)
+    job, alone, out = folder / "job.toml", folder / "alone", folder / "out"
+    job.write_text(JOB)
+    sweep("run", job, "--out", alone, "--cluster", "serial", "--no-figures", timeout=1800)
+    print("undisturbed:", state(alone), flush=True)
+    began = time.monotonic()
+    if args.slurm:
+        slurm = Slurm()
+        os.environ |= {"SLURM_CONF": str(slurm.conf), "CHIMERA_HPC_PRIVATE": str(folder / "own")}
+        try:
+            kills = killed_elements(slurm, job, out, args.kills, chance)
+            slurm.wait(1800)
+        finally:
+            slurm.stop()
+    else:
+        kills = killed_here(job, out, args.kills, chance)
+    ended = sweep("run", job, "--out", out, "--cluster", "serial", "--no-figures", timeout=1800)
+    print(f"{kills} kills in {time.monotonic() - began:.0f} s; {state(out)}; {folder}")
+    print("same points and digests" if same(out, alone) else "OTHER POINTS OR DIGESTS")
+    return 0 if ended.returncode == 0 and same(out, alone) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
