@@ -12,9 +12,9 @@ As in the modal class, runs that do not oscillate have a vote only where none do
 one over all classes, since a run that oscillates would alter the modal class.
 
 Votes are looked at after each batch. A lead is a posterior probability, which does not depend on
-when one stops: of cells whose shares come from the prior, at least the stated part is decided right.
-It is no bound for every single share: the nearer the two leading shares, the more often one of many
-looks decides by chance.
+when one stops: of cells whose shares come from the prior, at least the stated part is decided
+right. It is no bound for every single share: the nearer the two leading shares, the more often one
+of many looks decides by chance.
 
 The interval of a share is that of Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404. With a
 number of runs that was fixed before, it holds for any share at least as often as stated.

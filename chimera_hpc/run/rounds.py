@@ -24,7 +24,7 @@ from chimera_hpc.job import Points, Sweep
 from chimera_hpc.job.added import SEEDS
 from chimera_hpc.job.axes import Same
 from chimera_hpc.job.decide import Decide
-from chimera_hpc.job.points import dependency_order
+from chimera_hpc.job.points import dependency_order, point_keys
 from chimera_hpc.models.parameters import Column
 from chimera_hpc.run.judge import frozen_judge, other_judge
 from chimera_hpc.store.store import Store
@@ -135,20 +135,32 @@ def next_sweep(store: Store) -> Sweep | None:
     made = new_cells(now.cells, now.classes, now.open, decide.refine, now.independent)
     if not made and not batch.any():
         return None
-    added = _added(now, now.runs + batch, _with_followers(made, store.sweep, now.axes))
+    made = _with_followers(made, store.sweep, now.axes)
+    added = _added(now, now.runs + batch, _in_grid(store), made)
     data = {**store.sweep.to_dict(), "added": added}
     return Sweep.from_dict(data, str(store.path), store.sweep.origin)
 
 
-def _added(
-    now: Standing, seeds: NDArray[np.int64], made: Sequence[Mapping[str, int | float]]
-) -> dict[str, list[int | float]]:
-    """Return the table [added]: the cells that have more than the first seeds, then new ones.
+def _in_grid(store: Store) -> NDArray[np.bool_]:
+    """Return (n_cells,) which cells are in the grid of the last spec.
 
-    Refined cells of earlier rounds with the first seeds only are behind the grid's, and are kept.
+    Others are refined ones, or those of another store that was merged.
     """
+    cell, points = store.points.cells()[0], store.points
+    first = points[np.unique(cell, return_index=True)[1]]
+    grid = store.sweep.model_copy(update={"added": None}).points()
+    return np.asarray(np.isin(point_keys(first), point_keys(grid, first)))
+
+
+def _added(
+    now: Standing,
+    seeds: NDArray[np.int64],
+    in_grid: NDArray[np.bool_],
+    made: Sequence[Mapping[str, int | float]],
+) -> dict[str, list[int | float]]:
+    """Return the table [added]: the cells with other seeds than the grid has, then new ones."""
     first = now.decide.first
-    kept = np.flatnonzero((seeds != first) | (np.arange(len(seeds)) >= now.n_grid))
+    kept = np.flatnonzero((seeds != first) | ~in_grid)
     table = {name: now.cells[name][kept].tolist() for name in now.axes}
     for name in now.axes:
         table[name] += [cell[name] for cell in made]

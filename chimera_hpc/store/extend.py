@@ -121,8 +121,12 @@ def check_extension(path: Path, before: Sweep, old: Points, sweep: Sweep) -> Non
     new = sweep.points()
     missing = np.flatnonzero(~np.isin(point_keys(old), point_keys(new, old)))
     if len(missing):
+        rounds = before.added is not None and sweep.added is None
         row = ", ".join(f"{name}={value}" for name, value in old.row(int(missing[0])).items())
-        raise BadInput(f"{path}: an extension must hold all points of the store, not so {row}")
+        hint = "; take the sweep's folder instead of its job file" if rounds else ""
+        raise BadInput(
+            f"{path}: an extension must hold all points of the store, not so {row}{hint}"
+        )
     if sweep.keep.series == "first-seed" and new.row(0)["seed"] != old.row(0)["seed"]:
         raise BadInput(f"{path}: an extension may not change the first seed, whose series is kept")
 

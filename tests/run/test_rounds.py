@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from store_tools import Result, process_context, results
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import TRIPLET
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.points import point_keys
 from chimera_hpc.run.rounds import next_round, next_sweep, standing
 from chimera_hpc.store.claims import ClaimLost, claim_block
+from chimera_hpc.store.merge import merge
 from chimera_hpc.store.schema import scalar_labels
 from chimera_hpc.store.store import Store
 from chimera_hpc.store.write import Receipt
@@ -47,7 +49,7 @@ batch = 5
 most = 20
 refine = { epsilon = 0.02, P = 1 }
 """
-THRESHOLD = {2: 0.023, 3: 0.031, 4: 0.058}
+THRESHOLD = {2: 0.023, 3: 0.031, 4: 0.058, 5: 0.07}
 
 
 def made_up(store: Store, rows: np.ndarray) -> Result:
@@ -156,6 +158,21 @@ def test_the_points_do_not_depend_on_the_order_of_the_work(whole, tmp_path):
         stale, store = store, more
         assert next_round(stale).n_points == store.n_points  # another process was faster
     assert same(store, whole)
+
+
+def test_extended_and_merged_stores_go_on_with_their_rounds(whole, tmp_path):
+    job = Sweep.from_toml_text(JOB, ["P=[3]"])
+    other = finish(Store.plan(tmp_path / "other.zarr", job))
+    merge(tmp_path / "store.zarr", [whole, other])
+    merged = to_the_end(Store.open(tmp_path / "store.zarr"))
+    with pytest.raises(BadInput, match="take the sweep's folder instead of its job file"):
+        merged.extend(Sweep.from_toml_text(JOB, ["P=2:5"]))
+    grid = {**merged.sweep.to_dict()["grid"], "P": [2, 3, 4, 5]}
+    wider = Sweep.from_dict({**merged.sweep.to_dict(), "grid": grid})
+    now = standing(to_the_end(merged.extend(wider)))
+    assert now is not None
+    assert set(now.cells["P"].tolist()) == {2, 3, 4, 5}
+    assert (now.found.decided | (now.runs == 20)).all()
 
 
 def test_killed_at_any_moment_the_points_and_digests_are_the_same(whole, tmp_path):
