@@ -6,15 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.job.axes import Axis, Between, Same
+from chimera_hpc.job.axes import Axis, Between, Same, Values
 from chimera_hpc.job.points import as_array
 from chimera_hpc.job.table import Table
 
 Runs = Annotated[int, Field(ge=1, le=10**6)]
+
+
+_FINEST = 1e-9
+"""Of an axis, the smallest distance that it can be refined to."""
 
 
 class Decide(Table):
@@ -41,6 +45,15 @@ class Decide(Table):
         "differ further cells are added, halfway, down to this distance.",
     )
 
+    @field_validator("refine", mode="before")
+    @classmethod
+    def _numbers(cls, refine: Any) -> Any:
+        for name, distance in refine.items() if isinstance(refine, dict) else ():
+            number = isinstance(distance, int | float) and not isinstance(distance, bool)
+            if not number or not math.isfinite(distance):
+                raise BadInput(f"decide.refine.{name}: {short(distance)} is not a finite number")
+        return refine
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.most < self.first:
@@ -64,6 +77,10 @@ class Decide(Table):
             if whole and not isinstance(distance, int):
                 text = f"{short(distance)} is not an integer, as the values of {name} are"
                 raise BadInput(f"decide.refine.{name}: {text}")
+            length = 0.0 if isinstance(axis, Between) else _length(axis)
+            if distance < _FINEST * length:
+                text = f"{short(distance)} is below {_FINEST:g} of the axis, {length:g} long"
+                raise BadInput(f"decide.refine.{name}: {text}")
 
     def check_judge(self, atlas: Sequence[str]) -> None:
         """Raise BadInput when an atlas judges and reduction.atlas names none."""
@@ -85,10 +102,14 @@ def _filling(axis: Axis, distance: float) -> float:
     """Return how many times as many values an axis has when it is filled down to a distance."""
     if isinstance(axis, Between):
         return max(1.0, axis.step / distance)
-    assert not isinstance(axis, Same)
+    assert isinstance(axis, Values)
+    return max(1.0, (math.floor(_length(axis) / distance + 1e-9) + 1) / len(as_array(axis)))
+
+
+def _length(axis: Axis) -> float:
+    assert isinstance(axis, Values)
     values = as_array(axis)
-    length = float(values.max() - values.min())
-    return max(1.0, (math.floor(length / distance + 1e-9) + 1) / len(values))
+    return float(values.max() - values.min())
 
 
 def check_first(grid: Mapping[str, Any], decide: Decide | None) -> None:

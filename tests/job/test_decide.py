@@ -56,6 +56,12 @@ def test_full_grid_is_refined_everywhere():
         ({"grid.Q": "P", "decide.refine": {"Q": 1}}, "decide.refine.Q: follows P; refine P"),
         ({"decide.refine": {"P": 0.5}}, "decide.refine.P: 0.5 is not an integer"),
         ({"decide.refine": {"p": 1}}, "decide.refine.p: not an axis in [grid]; known: P, Q"),
+        ({"decide.refine": {"P": "x"}}, "decide.refine.P: 'x' is not a finite number"),
+        ({"decide.refine": {"P": True}}, "decide.refine.P: True is not a finite number"),
+        (
+            {"grid.b": [0.5, 1.0], "decide.refine": {"b": 1e-300}},
+            "decide.refine.b: 1e-300 is below 1e-09 of the axis, 0.5 long",
+        ),
         ({"decide.refine": {"P": 0}}, "decide.refine.P: 0 is not above 0"),
         ({"decide.judge": "all"}, "decide.judge = 'all'"),
         ({"decide.judge": "atlas"}, "reduction.atlas names no sweep whose classes judge"),
