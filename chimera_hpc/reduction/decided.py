@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -130,9 +131,11 @@ def decided_lines(results: Mapping[str, Any], axes: list[FreeAxis]) -> Iterator[
     if decide is None:
         return
     cells = decide["cells"]
-    n_decided = sum(cell["decided"] for cell in cells)
+    count = Counter(cell["class"] for cell in cells if cell["decided"])
+    of_each = ", ".join(f"{number} {name}" for name, number in count.most_common())
     yield (
-        f"decided: {n_decided} of {len(cells)} cells at {100 * decide['confidence']:g} %, by "
+        f"decided: {count.total()} of {len(cells)} cells at {100 * decide['confidence']:g} %"
+        f"{of_each and f' ({of_each})'}, by "
         f"{decide['runs']} runs in {decide['rounds']} rounds; a full grid takes "
         f"{decide['full_grid']}"
     )

@@ -89,7 +89,7 @@ def test_finished_sweep_has_nothing_to_compute(decided, sweep: Run):
     code, out, err = sweep("run", decided / "job.toml", *words)
     assert code == 0
     assert "nothing to compute" in err
-    assert "cells at 90 %" in out
+    assert "cells at 90 % (" in out
     assert results(decided / "sweep") == before
 
 
