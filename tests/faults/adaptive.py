@@ -12,42 +12,49 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent))
+from jobs_for_tests import SMALL, job_text
+from lab import Child, command, fork
 from slurm_real import Slurm
-from slurm_sweeps import command, sweep
+from slurm_sweeps import sweep
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job.points import point_keys
 from chimera_hpc.store.store import Store
 
-JOB = """
-name = "adaptive"
-model = "topological_fhn"
-[grid]
-P = 10
-Q = "4:7"
-[reduction]
-figures = []
-[keep]
-series = "none"
-[run]
-block = 2
-[decide]
-confidence = 0.99
-first = 5
-batch = 5
-most = 150
-[slurm]
-interface = "lo"
-mem = "900M"
-time = "30"
-"""
+JOB = job_text(
+    SMALL,
+    {
+        "name": "adaptive",
+        "model": "trouble:MODEL",
+        "grid.P": "2:5",
+        "grid.Q": None,
+        "grid.seeds": None,
+        "fixed.n_nodes": None,
+        "reduction.cuts": [2],
+        "reduction.figures": [],
+        "run.block": 2,
+        "decide.confidence": 1 - 1e-12,
+        "decide.first": 5,
+        "decide.batch": 5,
+        "decide.most": 60,
+        "slurm.interface": "lo",
+        "slurm.mem": "900M",
+        "slurm.time": "30",
+    },
+)
+"""So sure of a class that each cell takes some ten rounds."""
+POINT_SECONDS = 1.0
+"""A point sleeps: a machine with other work does not change where the kills fall."""
 
 
 def same(folder: Path, other: Path) -> bool:
@@ -63,24 +70,31 @@ def state(folder: Path) -> str:
     try:
         store = Store.open(folder / "store.zarr")
         done = int((store.ledger()["status"] != 255).sum())
-    except Exception as error:
+    except (BadInput, OSError) as error:
         return str(error)
     return f"round {len(store.sweeps)}, {done} of {store.n_points} points"
 
 
+def let_it_work(kill: int, out: Path, chance: random.Random, ended: Callable[[], object]) -> None:
+    """Wait for a random moment: while processes start every fifth time, else of their work."""
+    before, until = state(out), time.monotonic() + 90.0
+    while kill % 5 and state(out) == before and time.monotonic() < until and not ended():
+        time.sleep(0.2)
+    time.sleep(chance.uniform(0.0, 6.0))
+
+
 def killed_here(job: Path, out: Path, kills: int, chance: random.Random) -> int:
     """Run with two workers until it ends; return how many kills it took."""
-    words = command("run", job, "--out", out, "--workers", "2", "--no-figures")
+    words = ["run", str(job), "--out", str(out), "--workers", "2", "--no-figures"]
+    slow = {"TROUBLE_SECONDS": str(POINT_SECONDS)}
     for kill in range(kills):
-        with (out.parent / "run.log").open("ab") as log:
-            process = subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True)
-        try:
-            process.wait(chance.uniform(2.0, 12.0))
-        except subprocess.TimeoutExpired:
-            (os.kill if kill % 2 else os.killpg)(process.pid, signal.SIGKILL)
-            process.wait()
-        else:
+        output = job.with_name(f"run-{kill}.txt")
+        driver = Child(fork(lambda: command(iter(words)), output, slow), output)
+        let_it_work(kill, out, chance, lambda: driver.poll() is not None)  # noqa: B023
+        if driver.poll() is not None:
             return kill
+        (driver.signal if kill % 2 else driver.signal_group)(signal.SIGKILL)
+        driver.wait()
         print(f"kill {kill + 1}: {state(out)}", flush=True)
     return kills
 
@@ -91,7 +105,7 @@ def killed_elements(slurm: Slurm, job: Path, out: Path, kills: int, chance: rand
     done = sweep(*words)
     print(done.stdout, done.stderr)
     for kill in range(kills):
-        time.sleep(chance.uniform(2.0, 10.0))
+        let_it_work(kill, out, chance, lambda: not slurm.queue())
         elements = [line[0] for line in slurm.queue() if line[1] == "RUNNING"]
         if not elements:
             return kill
@@ -116,11 +130,17 @@ def main() -> int:
     folder, chance = Path(tempfile.mkdtemp(prefix="adaptive-")), random.Random(args.seed)
     job, alone, out = folder / "job.toml", folder / "alone", folder / "out"
     job.write_text(JOB)
+    folder.chmod(0o755)
+    shutil.copy(Path(__file__).with_name("trouble.py"), folder)
     sweep("run", job, "--out", alone, "--cluster", "serial", "--no-figures", timeout=1800)
     print("undisturbed:", state(alone), flush=True)
     began = time.monotonic()
     if args.slurm:
+        # Nodes of a real cluster have kernels of their own; here the undisturbed sweep left them.
+        kernels = Path.home() / ".cache" / "chimera_hpc" / "numba"
+        os.environ.setdefault("NUMBA_CACHE_DIR", str(kernels))
         slurm = Slurm()
+        os.environ["TROUBLE_SECONDS"] = str(POINT_SECONDS)
         os.environ |= {"SLURM_CONF": str(slurm.conf), "CHIMERA_HPC_PRIVATE": str(folder / "own")}
         try:
             kills = killed_elements(slurm, job, out, args.kills, chance)

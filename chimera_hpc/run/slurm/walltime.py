@@ -65,9 +65,10 @@ class Hours:
         return time.time() + _SAFETY * self._model(store).seconds(rows) < self.leave_by
 
     def _model(self, store: Store) -> CostModel:
-        """Return what is known of the costs, looked up once a minute."""
+        """Return what is known of the costs, looked up once a minute, and when the store grows."""
         looked, model = self._models.get(store.path, (-_LOOK_SECONDS, None))
-        if model is None or time.monotonic() - looked > _LOOK_SECONDS:
+        grown = model is not None and model.n_points < len(store.points)
+        if model is None or grown or time.monotonic() - looked > _LOOK_SECONDS:
             ledger = store.ledger()
             model = CostModel(store.sweep, store.points, ledger["status"], ledger["elapsed_us"])
             self._models[store.path] = (time.monotonic(), model)
@@ -81,6 +82,7 @@ class CostModel:
     """
 
     def __init__(self, sweep: Sweep, points: Points, status: Rows, elapsed_us: Rows) -> None:
+        self.n_points = len(points)
         columns = [c for name, c in points.columns.items() if name != "seed" and np.ptp(c) > 0]
         self._places = np.zeros((len(points), 1 + len(columns)))
         for k, column in enumerate(columns):

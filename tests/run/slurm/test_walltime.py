@@ -62,7 +62,8 @@ class _Store:
         self.points = self.sweep.points()
 
     def ledger(self) -> dict[str, np.ndarray]:
-        return {"status": np.full(64, Status.DONE), "elapsed_us": costs(self.sweep)}
+        n = len(self.points)
+        return {"status": np.full(n, Status.DONE), "elapsed_us": costs(self.sweep)[:n]}
 
 
 def test_only_what_fits_is_begun_but_for_the_first_block() -> None:
@@ -71,6 +72,14 @@ def test_only_what_fits_is_begun_but_for_the_first_block() -> None:
     assert hours.fits(store, rows)
     assert not hours.fits(store, rows)
     assert walltime.Hours(time.time() + 4, begun=True).fits(store, rows)
+
+
+def test_points_that_were_added_meanwhile_are_known() -> None:
+    store, hours = _Store(), walltime.Hours(time.time() + 60, begun=True)
+    store.points = store.points[:32]
+    assert hours.fits(store, np.arange(4))
+    store.points = store.sweep.points()
+    assert hours.fits(store, np.arange(60, 64))
 
 
 def test_nothing_is_begun_when_the_time_is_over() -> None:
