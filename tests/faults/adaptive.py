@@ -1,10 +1,11 @@
 """Kill the rounds of a sweep with [decide] again and again, and compare its end with another one.
 
-    python tests/faults/adaptive.py --kills 20              # run with two workers
+    python tests/faults/adaptive.py --kills 20              # two `run` at once on one store
+    python tests/faults/adaptive.py --kills 20 --workers    # one with two workers
     python tests/faults/adaptive.py --kills 20 --slurm      # a job array of two, by a real SLURM
 
-The undisturbed sweep is run by one process. Locally every second kill takes the driver alone, the
-others its workers too. Of an array one element is killed at a time, and submitted again.
+The undisturbed sweep is run by one process. Locally every third kill takes all drivers, and every
+second one their workers too. Of an array one element is killed at a time, and submitted again.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -83,19 +85,26 @@ def let_it_work(kill: int, out: Path, chance: random.Random, ended: Callable[[],
     time.sleep(chance.uniform(0.0, 6.0))
 
 
-def killed_here(job: Path, out: Path, kills: int, chance: random.Random) -> int:
-    """Run with two workers until it ends; return how many kills it took."""
-    words = ["run", str(job), "--out", str(out), "--workers", "2", "--no-figures"]
+def killed_here(job: Path, out: Path, kills: int, chance: random.Random, workers: bool) -> int:
+    """Run with two workers, or twice at once, until it ends; return how many kills it took."""
+    words = ["run", str(job), "--out", str(out), "--no-figures"]
+    how = [["--workers", "2"]] if workers else [["--cluster", "serial"]] * 2
     slow = {"TROUBLE_SECONDS": str(POINT_SECONDS)}
+    crew: list[Child] = []
     for kill in range(kills):
-        output = job.with_name(f"run-{kill}.txt")
-        driver = Child(fork(lambda: command(iter(words)), output, slow), output)
-        let_it_work(kill, out, chance, lambda: driver.poll() is not None)  # noqa: B023
-        if driver.poll() is not None:
+        crew = [each for each in crew if each.poll() is None]
+        for k in range(len(crew), len(how)):
+            output = job.with_name(f"run-{kill}-{k}.txt")
+            crew.append(Child(fork(partial(command, iter(words + how[k])), output, slow), output))
+        let_it_work(kill, out, chance, lambda: any(each.poll() == 0 for each in crew))  # noqa: B023
+        if any(each.poll() == 0 for each in crew):
             return kill
-        (driver.signal if kill % 2 else driver.signal_group)(signal.SIGKILL)
-        driver.wait()
+        for victim in crew if kill % 3 == 0 else crew[:1]:
+            (victim.signal if kill % 2 else victim.signal_group)(signal.SIGKILL)
+            victim.wait()
         print(f"kill {kill + 1}: {state(out)}", flush=True)
+    for each in crew:
+        each.signal_group(signal.SIGKILL)
     return kills
 
 
@@ -124,6 +133,7 @@ def _running(slurm: Slurm) -> list[str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--workers", action="store_true")
     parser.add_argument("--slurm", action="store_true")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
@@ -148,7 +158,7 @@ def main() -> int:
         finally:
             slurm.stop()
     else:
-        kills = killed_here(job, out, args.kills, chance)
+        kills = killed_here(job, out, args.kills, chance, args.workers)
     ended = sweep("run", job, "--out", out, "--cluster", "serial", "--no-figures", timeout=1800)
     print(f"{kills} kills in {time.monotonic() - began:.0f} s; {state(out)}; {folder}")
     print("same points and digests" if same(out, alone) else "OTHER POINTS OR DIGESTS")
