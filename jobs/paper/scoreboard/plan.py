@@ -22,7 +22,6 @@ JOBS = (
     "still",
     "excitability",
     "excitability-12",
-    "plane-10",
     "timescale",
     "robustness-1",
     "robustness-2",
@@ -30,6 +29,7 @@ JOBS = (
     "robustness-node",
     "networked",
     "plane",
+    "plane-10",
     "basin",
     "basin-200",
 )
