@@ -173,9 +173,9 @@ def _figures(
     # Pictures of another node or window than the default are files of their own.
     at_window = f"-window{window}" if window else ""
     at_node = "" if node == store.sweep.features.reference_node else f"-node{node}"
-    seen = [run for run in runs if np.isfinite(run.u).any()]
+    seen = [run for run in runs if run.begins]
     if seen:
-        panels = [(run.t, in_order(run.u.T, network, signals)) for run in seen]
+        panels = [(run.t, in_order(run.u, network, signals)) for run in seen]
         figures["space_time"] = space_time(panels, [run.title for run in seen], signals=signals)
     measured = [run for run in runs if run.n_windows]
     if measured:
@@ -183,9 +183,10 @@ def _figures(
         figures["profiles"] = fourier_indicators(
             [profiles_of(run.features) for run in measured], titles, signals=signals
         )
-    if np.isfinite(focus.u).all():
+    if focus.is_whole:
+        end = slice(-len(focus.w), None)
         figures[f"portrait{at_node}"] = ring_portrait(
-            *(focus.t, focus.u, focus.w, node),
+            *(focus.t[end], focus.u.at(end), focus.w, node),
             title=focus.title,
             nullcline=has_nullcline(store.sweep),
             period=focus.period,
@@ -193,7 +194,8 @@ def _figures(
         )
     if focus.n_windows:
         settings = store.sweep.features
-        data, text = window_spectrum(focus.t, focus.u, settings, node, window)
+        u = focus.u.at(slice(None))
+        data, text = window_spectrum(focus.t, u, settings, node, window)
         word = style.SIGNALS[signals]
         print(text.replace("node", word, 1))
         figures[f"spectrum{at_node}{at_window}"] = spectrum(data, f"{word} {node}, window {window}")
@@ -226,15 +228,17 @@ def _animate(store: Store, run: Replay, path: Path, periods: float) -> None:
     from chimera_hpc.plot.animation import animate_ring
     from chimera_hpc.reduction.replay import has_nullcline
 
-    if not np.isfinite(run.u).all():
+    if not run.is_whole:
         raise BadInput(f"--animate: {run.status.sentence}: there is nothing to show")
     length = run.t[-1] - run.t[0]
     duration = min(periods * run.period, length) if run.period > 0.0 else 0.1 * length
     step = run.t[1] - run.t[0]
     frame = max(1, round(duration / (periods * _FRAMES_A_PERIOD) / step))
-    first = int(np.searchsorted(run.t, run.t[-1] - duration))
+    begin = len(run.t) - len(run.w)
+    first = max(begin, int(np.searchsorted(run.t, run.t[-1] - duration)))
     part = slice(first, None, frame)
     title = ", ".join(run.title.split("\n"))
     nullcline = has_nullcline(store.sweep)
-    animate_ring(path, run.t[part], run.u[part], run.w[part], title=title, nullcline=nullcline)
+    w = run.w[first - begin :: frame]
+    animate_ring(path, run.t[part], run.u.at(part), w, title=title, nullcline=nullcline)
     print(f"written: {path}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,34 @@ from chimera_hpc.plot.style import drawn
 from chimera_hpc.reduction.cells import describe, free_axes
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.ledger import digests
-from chimera_hpc.store.schema import sample_times
+from chimera_hpc.store.schema import decode_series, sample_times
 from chimera_hpc.store.store import Store
 
 Array = NDArray[np.float64]
+
+_AT_ONCE = 10**7
+"""Samples of all nodes and points up to which points are computed together."""
+_MOST_W = 4 * 10**6
+"""Samples of w that are kept: portraits and films show the last periods only."""
+
+
+class Packed:
+    """u of a run as a store keeps it, decoded as it is asked for: ``series[first:last]``.
+
+    stored (T, N).
+    """
+
+    def __init__(self, stored: NDArray[Any]) -> None:
+        self._stored = stored
+        self.shape = stored.shape[::-1]
+
+    def __getitem__(self, nodes: slice) -> Array:
+        """Return u of some nodes, (nodes, T)."""
+        return decode_series(self._stored[:, nodes].T)
+
+    def at(self, times: slice) -> Array:
+        """Return u at some times, (times, N)."""
+        return decode_series(self._stored[times])
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +56,9 @@ class Replay:
 
     point: its number in the store.
     title: parameters that vary, seed and class.
-    t, u, w (T,), (T, N), (T, N): the two signals on the analysis interval, u as it is stored, NaN
-        after the end of a run that failed.
+    t (T,): sample times of the analysis interval.
+    u: as it is stored, missing after the end of a run that failed.
+    w (T', N): the second signal, at the last T' times.
     features (8, N): NaN unless the status is DONE.
     triplet (3,): V_theta, V_a, V_Omega.
     digest, stored: digest of what came out now, and of what the store holds, None where the point
@@ -43,7 +69,7 @@ class Replay:
     point: int
     title: str
     t: Array
-    u: Array
+    u: Packed
     w: Array
     status: Status
     features: Array
@@ -59,6 +85,16 @@ class Replay:
         return self.digest == self.stored
 
     @property
+    def begins(self) -> bool:
+        """Whether there is anything to see."""
+        return bool(np.isfinite(self.u.at(slice(0, 1))).any())
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the run came to its end."""
+        return bool(np.isfinite(self.u.at(slice(-1, None))).all())
+
+    @property
     def period(self) -> float:
         """Median over the nodes, NaN without features."""
         frequency = float(np.median(self.features[1]))
@@ -66,15 +102,22 @@ class Replay:
 
 
 def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
-    """Compute points of a store again, all at once; their bits do not depend on one another."""
-    from chimera_hpc.run.block import run_block, store_as
+    """Compute points of a store again; their bits do not depend on one another.
+
+    Large ones are computed one after the other, so that only one has its buffers in memory.
+    """
+    size = store.sweep.n_observed * len(sample_times(store.sweep))
+    if len(chosen) > 1 and size * len(chosen) > _AT_ONCE:
+        return [run for i in chosen for run in replay(store, [i])]
+    from chimera_hpc.run.block import run_block
 
     which = np.asarray(chosen, dtype=np.int64)
-    signals: dict[int, tuple[Array, Array]] = {}
+    signals: dict[int, tuple[Packed, Array]] = {}
 
-    def keep(row: int, u: Array, w: Array) -> None:
-        stored = np.empty(u.shape[::-1], dtype=store.sweep.keep.dtype)
-        signals[row] = store_as(u, stored, np.empty(u.shape)).T.copy(), w.T.copy()
+    def keep(row: int, u: NDArray[Any], w: Array) -> None:
+        few = max(1, min(len(u), _MOST_W // u.shape[1]))
+        # The buffer of a single point is not used again.
+        signals[row] = Packed(u if len(which) == 1 else u.copy()), w[:, -few:].T.copy()
 
     starts = store.starts(which)
     made = run_block(store.sweep, store.points[which], on_signals=keep, starts=starts)
@@ -88,7 +131,7 @@ def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
             u=signals[row][0],
             w=signals[row][1],
             status=Status(int(made.status[row])),
-            features=made.features[row, :, : signals[row][0].shape[1]],
+            features=made.features[row, :, : signals[row][0].shape[0]],
             triplet=made.scalars[row, : len(TRIPLET)],
             n_windows=int(made.n_windows[row]),
             digest=int(found[row]),

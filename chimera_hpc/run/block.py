@@ -34,7 +34,7 @@ from chimera_hpc.store.schema import MISSING, SCALE, sample_times, series_mask
 
 Array = NDArray[np.float64]
 
-OnSignals = Callable[[int, Array, Array], None]
+OnSignals = Callable[[int, NDArray[Any], Array], None]
 _RETRIED = (Status.NON_FINITE, Status.STEP_TOO_SMALL)
 
 
@@ -58,9 +58,8 @@ def run_block(
     should_stop: asked about ten times a second; when true, the result is returned as far as it has
         come.
     on_point: called with (index, status) as each point ends.
-    on_signals: called with (index, u, w) as each point ends; both signals are (N, T), NaN where the
-        run did not get to, as they were before u was rounded. They are buffers: copy what is to be
-        kept.
+    on_signals: called with (index, u, w) as each point ends: u (T, N) as a store keeps it and
+        w (N, T), missing after the end of a run. They are buffers: copy what is to be kept.
     lanes: lanes of the stepping loop; chosen from the work by default.
     nudge: how far initial states are moved (see `initial_state`); 0 for a sweep's own points.
     starts (n, variables): states, u then v, in place of the points' own initial states, as
@@ -203,7 +202,10 @@ class _Block:
         result.status[row] = outcome.status
         if self.on_signals is not None:
             outcome.samples[:, outcome.n_sampled :] = np.nan
-            self.on_signals(row, *model.node_pair(outcome.samples))
+            u, w = model.node_pair(outcome.samples)
+            stored = self.room_for(model.n_nodes, None)
+            store_as(u, stored, self.u[: model.n_nodes])
+            self.on_signals(row, stored, w)
         if outcome.status is not Status.DONE:
             return
         with foreign_code():

@@ -15,6 +15,7 @@ from chimera_hpc.measures import variation
 from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.plot import animation
 from chimera_hpc.plot.spectrum import vertex
+from chimera_hpc.reduction import replay as module
 from chimera_hpc.reduction.replay import replay, representative, window_spectrum
 from chimera_hpc.store.store import Store
 
@@ -55,9 +56,25 @@ def test_point_is_replayed_bit_for_bit_and_drawn(finished: Path, store: Store, s
 def test_replayed_signals_are_those_of_the_store(store: Store):
     chosen = [oscillating(store), 0]
     for run in replay(store, chosen):
-        assert run.u.tobytes() == store.series(run.point).tobytes()
+        assert run.u.at(slice(None)).tobytes() == store.series(run.point).tobytes()
+        assert run.u[2:4].tobytes() == store.node_series(run.point)[2:4].tobytes()
         assert run.is_same
-        assert run.w.shape == run.u.shape
+        assert run.begins
+        assert run.is_whole
+        assert run.w.shape == run.u.shape[::-1]
+
+
+def test_large_points_are_computed_one_by_one_and_only_their_last_w_is_kept(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+):
+    together = replay(store, [oscillating(store), 0])
+    monkeypatch.setattr(module, "_AT_ONCE", 1)
+    monkeypatch.setattr(module, "_MOST_W", 12 * 7)
+    alone = replay(store, [oscillating(store), 0])
+    for one, other in zip(alone, together, strict=True):
+        assert one.u[0:12].tobytes() == other.u[0:12].tobytes()
+        assert one.w.tobytes() == other.w[-7:].tobytes()
+        assert one.digest == other.digest
 
 
 def test_other_bits_than_stored_are_said_with_status_one(

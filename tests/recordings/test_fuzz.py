@@ -24,7 +24,7 @@ ORDERS = ["".join(order) for order in itertools.permutations("dmY")]
 FORMS = ("seconds", "mm:ss", "hh:mm:ss", "iso", "zoned", "compact", "compact ms", "epoch",
          "date and time", "none", *(f"{o}{mark}" for o in ORDERS for mark in "./-"))  # fmt: skip
 DAY = 86400.0
-N_PEAKS = 6
+N_PEAKS = 8
 # An example is a whole table.
 pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
 
