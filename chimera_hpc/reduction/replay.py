@@ -20,8 +20,9 @@ from chimera_hpc.plot.style import drawn
 from chimera_hpc.reduction.cells import describe, free_axes
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.ledger import digests
-from chimera_hpc.store.schema import decode_series, sample_times
+from chimera_hpc.store.schema import sample_times
 from chimera_hpc.store.store import Store
+from chimera_hpc.store.strips import PackedSeries
 
 Array = NDArray[np.float64]
 
@@ -29,25 +30,6 @@ _AT_ONCE = 10**7
 """Samples of all nodes and points up to which points are computed together."""
 _MOST_W = 4 * 10**6
 """Samples of w that are kept: portraits and films show the last periods only."""
-
-
-class Packed:
-    """u of a run as a store keeps it, decoded as it is asked for: ``series[first:last]``.
-
-    stored (T, N).
-    """
-
-    def __init__(self, stored: NDArray[Any]) -> None:
-        self._stored = stored
-        self.shape = stored.shape[::-1]
-
-    def __getitem__(self, nodes: slice) -> Array:
-        """Return u of some nodes, (nodes, T)."""
-        return decode_series(self._stored[:, nodes].T)
-
-    def at(self, times: slice) -> Array:
-        """Return u at some times, (times, N)."""
-        return decode_series(self._stored[times])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +51,7 @@ class Replay:
     point: int
     title: str
     t: Array
-    u: Packed
+    u: PackedSeries
     w: Array
     status: Status
     features: Array
@@ -112,12 +94,12 @@ def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
     from chimera_hpc.run.block import run_block
 
     which = np.asarray(chosen, dtype=np.int64)
-    signals: dict[int, tuple[Packed, Array]] = {}
+    signals: dict[int, tuple[PackedSeries, Array]] = {}
 
     def keep(row: int, u: NDArray[Any], w: Array) -> None:
         few = max(1, min(len(u), _MOST_W // u.shape[1]))
         # The buffer of a single point is not used again.
-        signals[row] = Packed(u if len(which) == 1 else u.copy()), w[:, -few:].T.copy()
+        signals[row] = PackedSeries(u if len(which) == 1 else u.copy()), w[:, -few:].T.copy()
 
     starts = store.starts(which)
     made = run_block(store.sweep, store.points[which], on_signals=keep, starts=starts)

@@ -21,8 +21,9 @@ from chimera_hpc.plot.figure_input import DrawnRun
 from chimera_hpc.plot.raster import NodeSeries
 from chimera_hpc.reduction.cells import FreeAxis, describe
 from chimera_hpc.reduction.selection import find_point, single_point
-from chimera_hpc.store.schema import sample_times, series_mask
+from chimera_hpc.store.schema import decode_series, sample_times, series_mask
 from chimera_hpc.store.store import Store
+from chimera_hpc.store.strips import PackedSeries
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,7 @@ def whole_runs(
             continue
         row = points.row(0)
         network, size = drawn_network(single, row, say), single.observed(points)[0]
-        made = DrawnRun(_place(row, axes), sample_times(single), u.T[:size])
+        made = DrawnRun(_place(row, axes), sample_times(single), PackedSeries(u[:, :size]))
         runs.append(replace(made, network=network, signals=single.signals))
     return runs
 
@@ -128,26 +129,29 @@ def node_series(store: Store, i: int) -> NodeSeries:
     """Return the series of a point node by node; it is computed again where it is not kept."""
     if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
         return store.node_series(i)
-    return series_of(store, i).T
+    return PackedSeries(_integrate(store.sweep, store.points[i : i + 1], store.starts([i]))[0])
 
 
 def series_of(store: Store, i: int) -> Array:
     """Return the series (T, N) of a point; it is computed again where it is not kept."""
     if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
         return store.series(i)
-    return _integrate(store.sweep, store.points[i : i + 1], store.starts([i]))[0]
+    stored, _ = _integrate(store.sweep, store.points[i : i + 1], store.starts([i]))
+    return decode_series(stored)
 
 
 def _place(row: Mapping[str, int | float], axes: Sequence[FreeAxis]) -> str:
     return ", ".join(filter(None, [describe(row, axes, math=True), f"seed {row['seed']}"]))
 
 
-def _integrate(sweep: Sweep, points: Points, starts: Array | None = None) -> tuple[Array, Status]:
-    """Compute one point as a task does; return its series (T, N) and its status."""
+def _integrate(
+    sweep: Sweep, points: Points, starts: Array | None = None
+) -> tuple[NDArray[Any], Status]:
+    """Compute one point as a task does; return its series (T, N), float32, and its status."""
     from chimera_hpc.run.block import run_block
 
     keep = Keep(series="all", dtype="float32")
     result = run_block(sweep.model_copy(update={"keep": keep}), points, starts=starts)
     series: NDArray[Any] | None = result.series
     assert series is not None
-    return series[0].astype(np.float64), Status(int(result.status[0]))
+    return series[0], Status(int(result.status[0]))

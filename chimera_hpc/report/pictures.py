@@ -24,6 +24,7 @@ from chimera_hpc.plot.raster import NodeSeries, bins, close_up
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.networks import DrawnNetworks
 from chimera_hpc.store.schema import FEATURES, sample_times, series_mask
+from chimera_hpc.store.strips import PackedSeries
 
 Array = NDArray[np.float64]
 
@@ -40,8 +41,8 @@ _STEPS = 256
 """Most nodes in a profile."""
 _COLOURS = 64
 _PROFILES = ("amplitude", "phase", "frequency")
-_BATCH = 16
-"""Runs that are replayed in one go."""
+_BATCH, _BATCH_SAMPLES = 16, 10**7
+"""Runs that are replayed in one go, and the most samples in all of them; a larger one is alone."""
 
 
 @dataclass(frozen=True)
@@ -165,16 +166,20 @@ def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array
     """Yield times and u node by node of points, read or replayed; in the order given."""
     store, t = content.store, sample_times(content.store.sweep)
     kept = series_mask(store.sweep, store.points.columns["seed"])
-    for start in range(0, len(points), _BATCH):
-        batch = np.array(points[start : start + _BATCH], dtype=np.int64)
+    size = min(_BATCH, max(1, _BATCH_SAMPLES // (len(t) * store.sweep.n_observed)))
+    for start in range(0, len(points), size):
+        batch = np.array(points[start : start + size], dtype=np.int64)
         missing = batch[~kept[batch]]
         replayed = dict(zip(missing.tolist(), _replay(content, missing), strict=True))
         for i in batch.tolist():
-            yield t, replayed[i].T[: store.size(i)] if i in replayed else store.node_series(i)
+            if i in replayed:
+                yield t, PackedSeries(replayed[i][:, : store.size(i)])
+            else:
+                yield t, store.node_series(i)
 
 
-def _replay(content: Content, points: NDArray[np.int64]) -> Array:
-    """Compute the series (n, T, N) of points again."""
+def _replay(content: Content, points: NDArray[np.int64]) -> NDArray[Any]:
+    """Compute the series (n, T, N) of points again, float32."""
     if not len(points):
         return np.empty((0, 0, 0))
     from chimera_hpc.run.block import run_block
@@ -185,7 +190,7 @@ def _replay(content: Content, points: NDArray[np.int64]) -> Array:
     series = run_block(sweep, store.points[points], starts=store.starts(points)).series
     if series is None:
         raise BadInput(f"{content.store.path}: the model gives no series to draw")
-    return np.asarray(series, dtype=np.float64)
+    return series
 
 
 def _profiles_of(content: Content, points: NDArray[np.int64]) -> dict[int, Array | None]:

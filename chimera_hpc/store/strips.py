@@ -148,6 +148,25 @@ class PackedSeries:
         return self._last[1]
 
 
+class PackedSeries:
+    """u of a run in memory as a store keeps it, decoded as it is asked for, like `StoredSeries`.
+
+    stored (T, N).
+    """
+
+    def __init__(self, stored: NDArray[Any]) -> None:
+        self._stored = stored
+        self.shape = stored.shape[::-1]
+
+    def __getitem__(self, nodes: slice) -> NDArray[np.float64]:
+        """Return u of some nodes, (nodes, T)."""
+        return decode_series(self._stored[:, nodes].T)
+
+    def at(self, times: slice) -> NDArray[np.float64]:
+        """Return u at some times, (times, N)."""
+        return decode_series(self._stored[times])
+
+
 class _Buffer:
     """A Blosc buffer of `size` bytes at an offset of a file."""
 
