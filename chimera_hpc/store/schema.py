@@ -119,7 +119,9 @@ def decode_series(stored: NDArray[Any]) -> NDArray[np.float64]:
     """Return a stored series as float64, NaN where a sample is missing."""
     if stored.dtype != np.int16:
         return stored.astype(np.float64)
-    return np.where(stored == MISSING, np.nan, stored * SCALE)
+    u = stored * SCALE
+    u[stored == MISSING] = np.nan
+    return np.asarray(u)
 
 
 def series_plan(
