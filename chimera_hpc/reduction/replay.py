@@ -22,7 +22,7 @@ from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.store.ledger import digests
 from chimera_hpc.store.schema import sample_times
 from chimera_hpc.store.store import Store
-from chimera_hpc.store.strips import PackedSeries
+from chimera_hpc.store.strips import SeriesInMemory
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Replay:
     point: int
     title: str
     t: Array
-    u: PackedSeries
+    u: SeriesInMemory
     w: Array
     status: Status
     features: Array
@@ -94,12 +94,12 @@ def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
     from chimera_hpc.run.block import run_block
 
     which = np.asarray(chosen, dtype=np.int64)
-    signals: dict[int, tuple[PackedSeries, Array]] = {}
+    signals: dict[int, tuple[SeriesInMemory, Array]] = {}
 
     def keep(row: int, u: NDArray[Any], w: Array) -> None:
         few = max(1, min(len(u), _MOST_W // u.shape[1]))
         # The buffer of a single point is not used again.
-        signals[row] = PackedSeries(u if len(which) == 1 else u.copy()), w[:, -few:].T.copy()
+        signals[row] = SeriesInMemory(u if len(which) == 1 else u.copy()), w[:, -few:].T.copy()
 
     starts = store.starts(which)
     made = run_block(store.sweep, store.points[which], on_signals=keep, starts=starts)

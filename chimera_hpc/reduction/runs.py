@@ -23,7 +23,7 @@ from chimera_hpc.reduction.cells import FreeAxis, describe
 from chimera_hpc.reduction.selection import find_point, single_point
 from chimera_hpc.store.schema import decode_series, sample_times, series_mask
 from chimera_hpc.store.store import Store
-from chimera_hpc.store.strips import PackedSeries
+from chimera_hpc.store.strips import SeriesInMemory
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def whole_runs(
             continue
         row = points.row(0)
         network, size = drawn_network(single, row, say), single.observed(points)[0]
-        made = DrawnRun(_place(row, axes), sample_times(single), PackedSeries(u[:, :size]))
+        made = DrawnRun(_place(row, axes), sample_times(single), SeriesInMemory(u[:, :size]))
         runs.append(replace(made, network=network, signals=single.signals))
     return runs
 
@@ -129,7 +129,7 @@ def node_series(store: Store, i: int) -> NodeSeries:
     """Return the series of a point node by node; it is computed again where it is not kept."""
     if series_mask(store.sweep, store.points.columns["seed"][i : i + 1]).all():
         return store.node_series(i)
-    return PackedSeries(_integrate(store.sweep, store.points[i : i + 1], store.starts([i]))[0])
+    return SeriesInMemory(_integrate(store.sweep, store.points[i : i + 1], store.starts([i]))[0])
 
 
 def series_of(store: Store, i: int) -> Array:

@@ -24,7 +24,7 @@ from chimera_hpc.plot.raster import NodeSeries, bins, close_up
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.networks import DrawnNetworks
 from chimera_hpc.store.schema import FEATURES, sample_times, series_mask
-from chimera_hpc.store.strips import PackedSeries
+from chimera_hpc.store.strips import SeriesInMemory
 
 Array = NDArray[np.float64]
 
@@ -173,7 +173,7 @@ def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array
         replayed = dict(zip(missing.tolist(), _replay(content, missing), strict=True))
         for i in batch.tolist():
             if i in replayed:
-                yield t, PackedSeries(replayed[i][:, : store.size(i)])
+                yield t, SeriesInMemory(replayed[i][:, : store.size(i)])
             else:
                 yield t, store.node_series(i)
 

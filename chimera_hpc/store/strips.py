@@ -148,7 +148,7 @@ class PackedSeries:
         return self._last[1]
 
 
-class PackedSeries:
+class SeriesInMemory:
     """u of a run in memory as a store keeps it, decoded as it is asked for, like `StoredSeries`.
 
     stored (T, N).
