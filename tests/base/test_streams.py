@@ -36,6 +36,10 @@ def test_published_vectors_of_the_initial_state(point, expected):
     assert raw(initial_stream(*point)) == expected
 
 
+def test_key_of_a_model_without_a_ring():
+    assert streams.stream_key("mine:X", 5, {"seed": 3}) == ("mine:X", 5, 1, 0, 0, 3)
+
+
 def test_published_vector_of_the_topology():
     generator = topology_stream("topological_fhn", 50, 1, 13, 13, 3, 40)
     assert raw(generator) == [1450647402846782716, 8634726795373142443]
