@@ -30,7 +30,7 @@ def test_gaps_are_found_at_the_beginning_the_end_and_in_the_times():
 def test_step_half_as_long_again_as_usual_is_no_gap():
     t = np.array([0.0, 1.0, 2.5, 3.5])
     assert find_gaps(t, np.ones((4, 1)), 1.0) == []
-    assert len(find_gaps(t + [0.0, 0.0, 0.125, 0.125], np.ones((4, 1)), 1.0)) == 1
+    assert len(find_gaps(np.where(t > 2.0, t + 0.125, t), np.ones((4, 1)), 1.0)) == 1
 
 
 def test_longest_stretch_is_without_long_gaps_and_whole_at_its_ends():
