@@ -234,7 +234,9 @@ def hysteresis(chains: Sequence[Mapping[str, Any]], along: str, order: str) -> f
         dots = plot.scatter("x", "order", source=source, marker=marker, size=6, **look)
         tooltips = [(along, "@x"), (order, "@order{0.0000}"), ("class", "@class")]
         plot.add_tools(HoverTool(renderers=[dots], tooltips=tooltips))
-    plot.legend.background_fill_alpha = 0.8
+    legend = plot.legend[0]
+    legend.orientation, legend.spacing, legend.border_line_color = "horizontal", 20, None
+    plot.add_layout(legend, "above")  # inside it would hide points of either direction
     return plot
 
 
