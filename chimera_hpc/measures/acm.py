@@ -52,11 +52,16 @@ def adaptive_coherence(u: ArrayLike, threshold: float | None = None) -> Coherenc
         A wrong shape, too few times, or values that are not finite.
     """
     rows = node_rows("u", u)
+    return run_coherence(rows, rows.mean(axis=1), threshold)
+
+
+def run_coherence(rows: Array, mean: Array, threshold: float | None = None) -> Coherence:
+    """As `adaptive_coherence`, of rows (N, T) and their means (N,)."""
     low, high = float(rows.min()), float(rows.max())
     if rows.shape[1] < 6 or not np.isfinite(low + high):
         raise BadInput("u must hold at least 6 times and be finite")
     delays = _delays(rows, 0.5 * (low + high) if threshold is None else threshold)
-    return Coherence(_synchrony(rows, delays), len(np.unique(delays)))
+    return Coherence(_synchrony(rows, mean, delays), len(np.unique(delays)))
 
 
 def _delays(rows: Array, threshold: float) -> NDArray[np.int64]:
@@ -66,10 +71,10 @@ def _delays(rows: Array, threshold: float) -> NDArray[np.int64]:
     return np.argmax(rises, axis=1) if rises.shape[1] else np.zeros(len(rows), dtype=np.int64)
 
 
-def _synchrony(rows: Array, delays: NDArray[np.int64]) -> float:
+def _synchrony(rows: Array, mean: Array, delays: NDArray[np.int64]) -> float:
     """Return chi^2 of the aligned rows."""
     total = np.zeros(rows.shape[1] - int(delays.max()))
-    variance: float = _align(rows, delays, rows.mean(axis=1), total)
+    variance: float = _align(rows, delays, mean, total)
     return float((total / len(rows)).var()) * len(rows) / variance if variance else float("nan")
 
 

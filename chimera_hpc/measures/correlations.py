@@ -36,11 +36,12 @@ from numpy.typing import ArrayLike, NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures.checks import Array, node_rows
-from chimera_hpc.measures.neighbours import neighbours
+from chimera_hpc.measures.neighbours import NeighbourTable, neighbours
 
 # Largest curvature, as a share of the range of u, that rounding alone gives.
 _NOISE = 1e-9
 _CHUNK = 256
+_PRODUCT_CHUNK = 1024
 _DELTA = 0.01
 
 
@@ -49,6 +50,8 @@ class _Field(NamedTuple):
 
     parts: Array
     """(1 or 2, N, T)"""
+    mean: Array
+    """(1 or 2, N)"""
     noise: float
     """Largest curvature or distance that counts as none."""
 
@@ -75,34 +78,47 @@ def g0(u: ArrayLike, pairs: str | ArrayLike = "ring", delta: float = _DELTA) -> 
     return _g0(_field(u), pairs, delta)
 
 
-def run_correlations(u: ArrayLike, pairs: str | ArrayLike) -> tuple[Array, Array, float]:
-    """Return g0 (T,) over pairs of neighbours and over all pairs, and h0, of a run u (T, N)."""
-    field = _field(u)
-    h = _h0(field, _DELTA, relative=True) if field.parts.shape[1] > 1 else math.nan
-    return _g0(field, pairs, _DELTA), _g0(field, "global", _DELTA), h
+def run_correlations(
+    rows: Array, mean: Array, around: NeighbourTable
+) -> tuple[Array, Array, float]:
+    """Return g0 (T,) over neighbours and over all pairs, and h0, of rows (N, T) and their means."""
+    field = _checked(rows[None], mean[None])
+    h = _h0(field, _DELTA, relative=True) if len(rows) > 1 else math.nan
+    return _share_of_nodes(field, around, _DELTA), _share_of_pairs(field, _DELTA), h
 
 
 def _g0(field: _Field, pairs: str | ArrayLike, delta: float) -> Array:
-    parts, noise = field
-    n_nodes, n_times = parts.shape[1:]
-    found = np.zeros(n_times)
     if isinstance(pairs, str) and pairs == "global":
-        n_pairs = n_nodes * (n_nodes - 1) // 2
-        largest = _farthest(parts)
-        if n_pairs == 0 or largest <= noise:
-            return np.ones(n_times)
-        _count_pairs(parts, delta * largest, np.empty((4, _CHUNK)), found)
-        correlation: Array = np.sqrt(found / n_pairs)
-        return correlation
-    around = neighbours(pairs, n_nodes)
-    work = np.empty((4, _CHUNK))
-    largest = _curvature(parts, *around, math.inf, work, found)
-    if largest <= noise:
+        return _share_of_pairs(field, delta)
+    return _share_of_nodes(field, neighbours(pairs, field.parts.shape[1]), delta)
+
+
+def _share_of_nodes(field: _Field, around: NeighbourTable, delta: float) -> Array:
+    n_nodes, n_times = field.parts.shape[1:]
+    found = np.zeros(n_times)
+    largest = _curvature(field.parts, *around, math.inf, *_work(), found)
+    if largest <= field.noise:
         return np.ones(n_times)
     found[:] = 0
-    _curvature(parts, *around, delta * largest, work, found)
+    _curvature(field.parts, *around, delta * largest, *_work(), found)
     share: Array = found / n_nodes
     return share
+
+
+def _share_of_pairs(field: _Field, delta: float) -> Array:
+    n_nodes, n_times = field.parts.shape[1:]
+    found = np.zeros(n_times)
+    n_pairs = n_nodes * (n_nodes - 1) // 2
+    largest = _farthest(field.parts)
+    if n_pairs == 0 or largest <= field.noise:
+        return np.ones(n_times)
+    _count_pairs(field.parts, delta * largest, *_work(), found)
+    correlation: Array = np.sqrt(found / n_pairs)
+    return correlation
+
+
+def _work() -> tuple[Array, NDArray[np.int64]]:
+    return np.empty((3, _CHUNK)), np.empty(_CHUNK, dtype=np.int64)
 
 
 def h0(u: ArrayLike, delta: float = _DELTA, *, relative: bool = True) -> float:
@@ -135,13 +151,13 @@ def h0(u: ArrayLike, delta: float = _DELTA, *, relative: bool = True) -> float:
 
 
 def _h0(field: _Field, delta: float, relative: bool) -> float:
-    parts = field.parts
-    n_nodes = parts.shape[1]
-    rho = _correlations(parts)[np.triu_indices(n_nodes, 1)]
+    n_nodes = field.parts.shape[1]
+    rho = _correlations(field)
+    rho[np.tri(n_nodes, dtype=np.bool_)] = -1.0  # each pair once
     largest = float(rho.max()) if relative else 1.0
     # Rounding may leave the |rho| of equal signals below 1.
-    close = rho >= (1.0 - delta) * largest - 1e-14
-    return math.sqrt(np.count_nonzero(close) / rho.size) if largest > 0 else 0.0
+    close = np.count_nonzero(rho >= (1.0 - delta) * largest - 1e-14)
+    return math.sqrt(close / (n_nodes * (n_nodes - 1) // 2)) if largest > 0 else 0.0
 
 
 def _field(u: ArrayLike) -> _Field:
@@ -151,10 +167,14 @@ def _field(u: ArrayLike) -> _Field:
         parts = np.stack([node_rows("u", part) for part in (values.real, values.imag)])
     else:
         parts = node_rows("u", u)[None]
+    return _checked(parts, parts.mean(axis=2))
+
+
+def _checked(parts: Array, mean: Array) -> _Field:
     low, high = parts.min(axis=(1, 2)), parts.max(axis=(1, 2))
     if not np.isfinite(low + high).all():
         raise BadInput("u must be finite")
-    return _Field(parts, _NOISE * float((high - low).max()))
+    return _Field(parts, mean, _NOISE * float((high - low).max()))
 
 
 def _check_delta(delta: float) -> None:
@@ -166,18 +186,17 @@ def _farthest(parts: Array) -> float:
     """Return the largest distance of two nodes at one time."""
     if len(parts) == 1:
         return float((parts[0].max(axis=0) - parts[0].min(axis=0)).max())
-    nothing = np.zeros(parts.shape[2])
-    return float(_count_pairs(parts, 0.0, np.empty((4, _CHUNK)), nothing))
+    return float(_count_pairs(parts, 0.0, *_work(), np.zeros(parts.shape[2])))
 
 
-def _correlations(parts: Array) -> NDArray[np.float64]:
+def _correlations(field: _Field) -> NDArray[np.float64]:
     """Return the modulus of the correlation coefficients of all pairs, (N, N)."""
+    parts, mean, _ = field
     n_nodes, n_times = parts.shape[1:]
-    mean = parts.mean(axis=2, keepdims=True)
     product = np.zeros((n_nodes, n_nodes), dtype=np.float64 if len(parts) == 1 else np.complex128)
     # In chunks of times: a centred copy of the whole run costs more than the products.
-    for start in range(0, n_times, _CHUNK):
-        centred = parts[:, :, start : start + _CHUNK] - mean
+    for start in range(0, n_times, _PRODUCT_CHUNK):
+        centred = parts[:, :, start : start + _PRODUCT_CHUNK] - mean[:, :, None]
         z = centred[0] if len(parts) == 1 else centred[0] + 1j * centred[1]
         product += z @ (z.T if len(parts) == 1 else z.conj().T)
     size: NDArray[np.float64] = np.abs(product)
@@ -191,28 +210,21 @@ def _correlations(parts: Array) -> NDArray[np.float64]:
 
 
 @jit()
-def _curvature(parts: Any, indptr: Any, indices: Any, limit: float, work: Any, found: Any) -> float:
+def _curvature(
+    parts: Any, indptr: Any, indices: Any, limit: float, work: Any, count: Any, found: Any
+) -> float:
     """Add to found (T,) the number of nodes with a curvature < limit; return the largest."""
     n_parts, n_nodes, n_times = parts.shape
-    size, here, count, most = work[0], work[1], work[2], work[3]
+    size, here, most = work[0], work[1], work[2]
     most[:] = 0.0
-    for start in range(0, n_times, size.size):
-        n = min(size.size, n_times - start)
-        count[:n] = 0.0
+    for start in range(0, n_times, count.size):
+        n = min(count.size, n_times - start)
+        count[:n] = 0
         for j in range(n_nodes):
-            degree = indptr[j + 1] - indptr[j]
-            for p in range(n_parts):
-                x = parts[p, j, start : start + n]
-                for i in range(n):
-                    here[i] = -degree * x[i]
-                for k in range(indptr[j], indptr[j + 1]):
-                    other = parts[p, indices[k], start : start + n]
-                    for i in range(n):
-                        here[i] += other[i]
-                if p == 0:
-                    for i in range(n):
-                        size[i] = abs(here[i])
+            others = indices[indptr[j] : indptr[j + 1]]
+            _bend(parts[0], j, others, start, n, size)
             if n_parts > 1:
+                _bend(parts[1], j, others, start, n, here)
                 for i in range(n):
                     size[i] = np.sqrt(size[i] * size[i] + here[i] * here[i])
             _tally(size, limit, n, count, most)
@@ -223,26 +235,44 @@ def _curvature(parts: Any, indptr: Any, indices: Any, limit: float, work: Any, f
 
 
 @jit()
-def _count_pairs(parts: Any, limit: float, work: Any, found: Any) -> float:
-    """Add to found (T,) the number of pairs with a distance < limit; return the largest."""
+def _bend(rows: Any, j: int, others: Any, start: int, n: int, here: Any) -> None:
+    """Write the sum of the differences of others and a node j, n times from start."""
+    degree = float(others.size)
+    x = rows[j, start : start + n]
+    if others.size == 2:  # on a ring: in one pass
+        a, b = rows[others[0], start : start + n], rows[others[1], start : start + n]
+        for i in range(n):
+            here[i] = -degree * x[i] + a[i] + b[i]
+        return
+    for i in range(n):
+        here[i] = -degree * x[i]
+    for k in others:
+        other = rows[k, start : start + n]
+        for i in range(n):
+            here[i] += other[i]
+
+
+@jit()
+def _count_pairs(parts: Any, limit: float, work: Any, count: Any, found: Any) -> float:
+    """Add to found (T,) the number of pairs with a distance < limit.
+
+    Return the largest distance, of two parts only.
+    """
     n_parts, n_nodes, n_times = parts.shape
-    size, count, most = work[0], work[2], work[3]
+    size, most = work[0], work[2]
     most[:] = 0.0
-    for start in range(0, n_times, size.size):
-        n = min(size.size, n_times - start)
-        count[:n] = 0.0
+    for start in range(0, n_times, count.size):
+        n = min(count.size, n_times - start)
+        count[:n] = 0
         for j in range(n_nodes):
-            one = parts[0, j, start : start + n]
+            if n_parts == 1:
+                _count_near(parts[0], j, start, limit, count[:n])
+                continue
             for k in range(j):
-                other = parts[0, k, start : start + n]
-                if n_parts == 1:
-                    for i in range(n):
-                        count[i] += 1.0 if abs(one[i] - other[i]) < limit else 0.0
-                    continue
-                for i in range(n):
-                    dx = one[i] - other[i]
-                    dy = parts[1, j, start + i] - parts[1, k, start + i]
-                    size[i] = np.sqrt(dx * dx + dy * dy)
+                for i in range(start, start + n):
+                    dx = parts[0, j, i] - parts[0, k, i]
+                    dy = parts[1, j, i] - parts[1, k, i]
+                    size[i - start] = np.sqrt(dx * dx + dy * dy)
                 _tally(size, limit, n, count, most)
         for i in range(n):
             found[start + i] += count[i]
@@ -251,11 +281,31 @@ def _count_pairs(parts: Any, limit: float, work: Any, found: Any) -> float:
 
 
 @jit()
+def _count_near(rows: Any, j: int, start: int, limit: float, count: Any) -> None:
+    """Count at each time the nodes before j that are near j, four at a time."""
+    n = count.size
+    one = rows[j, start : start + n]
+    whole = j - j % 4
+    for k in range(0, whole, 4):
+        a, b = rows[k, start : start + n], rows[k + 1, start : start + n]
+        c, d = rows[k + 2, start : start + n], rows[k + 3, start : start + n]
+        for i in range(n):
+            near = np.int64(abs(one[i] - a[i]) < limit) + np.int64(abs(one[i] - b[i]) < limit)
+            near += np.int64(abs(one[i] - c[i]) < limit) + np.int64(abs(one[i] - d[i]) < limit)
+            count[i] += near
+    for k in range(whole, j):
+        other = rows[k, start : start + n]
+        for i in range(n):
+            count[i] += np.int64(abs(one[i] - other[i]) < limit)
+
+
+@jit()
 def _tally(size: Any, limit: float, n: int, count: Any, most: Any) -> None:
     """Count the first n sizes that are < limit, and keep the largest of each place."""
     for i in range(n):
-        count[i] += 1.0 if size[i] < limit else 0.0
-        most[i] = size[i] if size[i] > most[i] else most[i]
+        here = abs(size[i])
+        count[i] += np.int64(here < limit)
+        most[i] = here if here > most[i] else most[i]
 
 
 @jit()

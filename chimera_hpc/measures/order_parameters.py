@@ -33,7 +33,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
-from chimera_hpc.measures.checks import Array, floats, node_rows
+from chimera_hpc.measures.checks import Array, floats
+from chimera_hpc.measures.measure import Orbits
 from chimera_hpc.measures.neighbours import NeighbourTable, neighbours
 
 # Unit vectors that a chunk of times holds, so that they stay in the second-level cache.
@@ -132,43 +133,31 @@ class RunOrders(NamedTuple):
     """Time mean of R_k around each node, (N,)."""
 
 
-def run_orders(u: ArrayLike, w: ArrayLike, around: NeighbourTable | None = None) -> RunOrders:
-    """Order parameters of a run u, w (T, N), in one pass without a phase.
+def run_orders(orbits: Orbits, around: NeighbourTable) -> RunOrders:
+    """Order parameters of a run and its neighbours, in one pass without a phase.
 
-    As `order_parameter` and `local_order` of `phase_angles.phases`, "geometric". Neighbours are
-    those of a ring by default.
+    As `order_parameter` and `local_order` of `phase_angles.phases`, "geometric".
     """
-    x, y = node_rows("u", u), node_rows("w", w)
-    around = neighbours("ring", len(x)) if around is None else around
-    local, sums = np.zeros(len(x)), np.zeros(2)
-    _orders(_orbits(x, y), around.indptr, around.indices, _work(len(x)), local, sums)
-    mean, square = sums / x.shape[1]
-    return RunOrders(mean, np.sqrt(max(square - mean * mean, 0.0)), local / x.shape[1])
+    n_nodes, n_times = orbits.x.shape
+    local, sums = np.zeros(n_nodes), np.zeros(2)
+    _orders(orbits, around.indptr, around.indices, _work(n_nodes), local, sums)
+    mean, square = sums / n_times
+    return RunOrders(mean, np.sqrt(max(square - mean * mean, 0.0)), local / n_times)
 
 
 def run_communities(
-    u: ArrayLike, w: ArrayLike, members: Sequence[NDArray[np.int64]]
+    orbits: Orbits, members: Sequence[NDArray[np.int64]]
 ) -> tuple[Array, Array, float]:
     """Return mean and variance in time of R_c (C,), and the time mean of its variance over c.
 
     As `community_order` of the geometric phases. Variances are those of the population.
     """
-    x, y = node_rows("u", u), node_rows("w", w)
+    n_nodes, n_times = orbits.x.shape
     bounds = np.cumsum([0, *map(len, members)])
     sums, total = np.zeros((2, len(members))), np.zeros(1)
-    nodes = np.concatenate(members)
-    _communities(_orbits(x, y), bounds, nodes, _work(len(x)), sums, total)
-    mean, square = sums / x.shape[1]
-    return mean, np.maximum(square - mean * mean, 0.0), float(total[0] / x.shape[1])
-
-
-class _Orbits(NamedTuple):
-    """Two components of N nodes (N, T), and their means in time (N,)."""
-
-    x: Array
-    y: Array
-    x_mean: Array
-    y_mean: Array
+    _communities(orbits, bounds, np.concatenate(members), _work(n_nodes), sums, total)
+    mean, square = sums / n_times
+    return mean, np.maximum(square - mean * mean, 0.0), float(total[0] / n_times)
 
 
 class _Work(NamedTuple):
@@ -176,12 +165,6 @@ class _Work(NamedTuple):
 
     vectors: Array
     sums: Array
-
-
-def _orbits(x: Array, y: Array) -> _Orbits:
-    if x.shape != y.shape:
-        raise BadInput(f"u and w must have one shape, not {x.T.shape} and {y.T.shape}")
-    return _Orbits(x, y, x.mean(axis=1), y.mean(axis=1))
 
 
 def _work(n_nodes: int) -> _Work:
@@ -231,16 +214,30 @@ def _orders(orbits: Any, indptr: Any, indices: Any, work: Any, local: Any, sums:
             sums[0] += total[2, i] / n_nodes
             sums[1] += total[2, i] * total[2, i] / (n_nodes * n_nodes)
         for j in range(n_nodes):
-            for i in range(n):
-                total[0, i] = vectors[0, j, i]
-                total[1, i] = vectors[1, j, i]
-            for k in range(indptr[j], indptr[j + 1]):
-                _add(vectors, indices[k], n, total)
-            _lengths(total, n)
+            _around(vectors, j, indices[indptr[j] : indptr[j + 1]], n, total)
             length = 0.0
             for i in range(n):
                 length += total[2, i]
             local[j] += length / (1 + indptr[j + 1] - indptr[j])
+
+
+@jit()
+def _around(vectors: Any, j: int, others: Any, n: int, total: Any) -> None:
+    """Write the length of the sum of the vectors of a node and of others into total[2]."""
+    x, y, length = vectors[0], vectors[1], total[2]
+    if others.size == 2:  # on a ring: in one pass
+        a, b = others
+        for i in range(n):
+            along = x[j, i] + x[a, i] + x[b, i]
+            across = y[j, i] + y[a, i] + y[b, i]
+            length[i] = np.sqrt(along * along + across * across)
+        return
+    for i in range(n):
+        total[0, i] = x[j, i]
+        total[1, i] = y[j, i]
+    for k in others:
+        _add(vectors, k, n, total)
+    _lengths(total, n)
 
 
 @jit()

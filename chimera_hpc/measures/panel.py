@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chimera_hpc.measures.measure import Measure, MeasuredRun
 
@@ -13,15 +12,10 @@ BAD_FIT = 0.5
 """R^2 below which a sine does not describe a node: more of its variance is in the rest."""
 
 
-def _pairs(run: MeasuredRun) -> str | NDArray[np.int64]:
-    return "ring" if run.pairs is None else run.pairs
-
-
 def _order(run: MeasuredRun) -> Sequence[float]:
-    from chimera_hpc.measures.neighbours import neighbours
     from chimera_hpc.measures.order_parameters import run_orders
 
-    found = run_orders(run.u, run.w, neighbours(_pairs(run), run.u.shape[1]))
+    found = run_orders(run.orbits, run.around)
     return found.mean, found.deviation, float(found.local.mean()), float(found.local.min())
 
 
@@ -30,35 +24,33 @@ def _communities(run: MeasuredRun) -> Sequence[float]:
     from chimera_hpc.measures.order_parameters import run_communities
 
     members = np.array_split(np.arange(run.u.shape[1]), run.settings.groups)
-    _, variance, chi = run_communities(run.u, run.w, members)
+    _, variance, chi = run_communities(run.orbits, members)
     return chi, float(variance.mean())
 
 
 def _correlations(run: MeasuredRun) -> Sequence[float]:
     from chimera_hpc.measures.correlations import run_correlations
 
-    near, all_pairs, time = run_correlations(run.u, _pairs(run))
+    near, all_pairs, time = run_correlations(run.orbits.x, run.orbits.x_mean, run.around)
     return float(near.mean()), float(near.std()), float(all_pairs.mean()), time
 
 
 def _velocity(run: MeasuredRun) -> Sequence[float]:
     from chimera_hpc.measures.phase_velocity import plateau, run_velocity
 
-    velocity = run_velocity(run.t, run.u, run.w)
+    velocity = run_velocity(run.t, run.orbits)
     return float(velocity.mean()), float(velocity.std()), plateau(velocity)
 
 
 def _centre_of_mass(run: MeasuredRun) -> Sequence[float]:
-    from chimera_hpc.measures.centres import centre_of_mass
-
-    distance = centre_of_mass(run.u, run.w)
+    distance = np.sqrt(np.square(run.orbits.x_mean) + np.square(run.orbits.y_mean))
     return float(distance.mean()), float(distance.std())
 
 
 def _acm(run: MeasuredRun) -> Sequence[float]:
-    from chimera_hpc.measures.acm import adaptive_coherence
+    from chimera_hpc.measures.acm import run_coherence
 
-    return adaptive_coherence(run.u)
+    return run_coherence(run.orbits.x, run.orbits.x_mean)
 
 
 def _fit(run: MeasuredRun) -> Sequence[float]:

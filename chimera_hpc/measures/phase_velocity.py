@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.measures.checks import Array, floats, node_rows
+from chimera_hpc.measures.measure import Orbits
 
 PLATEAU_WIDTH = 0.01
 
@@ -81,13 +82,12 @@ def plateau(velocity: ArrayLike, width: float = PLATEAU_WIDTH) -> float:
     return float(group.max() / values.size)
 
 
-def run_velocity(t: Array, u: ArrayLike, w: ArrayLike) -> Array:
-    """Mean phase velocity (N,) of a run u, w (T, N) by its angle about each node's mean point.
+def run_velocity(t: Array, orbits: Orbits) -> Array:
+    """Mean phase velocity (N,) of a run by its angle about each node's mean point.
 
     As `mean_phase_velocity` of `phase_angles.phases`, "geometric", without an angle per sample.
     """
-    x, y = node_rows("u", u), node_rows("w", w)
-    x_mean, y_mean = x.mean(axis=1), y.mean(axis=1)
+    x, y, x_mean, y_mean = orbits
     turns = np.empty(len(x))
     _turns(x, y, x_mean, y_mean, turns)
     first = np.arctan2(y[:, 0] - y_mean, x[:, 0] - x_mean)
@@ -101,12 +101,14 @@ def _turns(x: Any, y: Any, x_mean: Any, y_mean: Any, turns: Any) -> None:
     """Write how often each orbit crosses the negative x axis, downwards less upwards."""
     for j in range(x.shape[0]):
         count = 0
-        before_x, before_y = x[j, 0] - x_mean[j], y[j, 0] - y_mean[j]
+        # Differences from the mean are needed where their signs change only.
+        now = y[j, 0] >= y_mean[j]
         for i in range(1, x.shape[1]):
-            here_x, here_y = x[j, i] - x_mean[j], y[j, i] - y_mean[j]
-            if (before_y >= 0.0) != (here_y >= 0.0):
+            above, now = now, y[j, i] >= y_mean[j]
+            if above != now:
+                before_x, before_y = x[j, i - 1] - x_mean[j], y[j, i - 1] - y_mean[j]
+                here_x, here_y = x[j, i] - x_mean[j], y[j, i] - y_mean[j]
                 area = before_x * here_y - before_y * here_x
-                count += before_y >= 0.0 and area > 0.0
-                count -= before_y < 0.0 and area < 0.0
-            before_x, before_y = here_x, here_y
+                count += above and area > 0.0
+                count -= not above and area < 0.0
         turns[j] = count

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -292,7 +293,7 @@ def test_the_streamed_panel_equals_the_public_functions() -> None:
 
 def test_a_network_gives_its_own_neighbours() -> None:
     pairs = np.array([(i, (i + k) % 13) for i in range(13) for k in (1, 2)])
-    run = measured()._replace(pairs=pairs)
+    run = replace(measured(), pairs=pairs)
     found = scalars(run, "order", "g0h0")
     local = measures.local_order(measures.phases(run.u, run.w), pairs).mean()
     assert found["R_local"] == pytest.approx(local, rel=1e-9)
@@ -303,7 +304,7 @@ def test_a_network_gives_its_own_neighbours() -> None:
 def test_bursts_are_badly_fitted() -> None:
     run = measured()
     u = np.exp(-0.5 * ((run.t[:, None] + 0.1 * np.arange(5)) % 1.0 / 0.02) ** 2)
-    bursts = run._replace(u=u, features=measure_signals(run.t, u))
+    bursts = replace(run, u=u, features=measure_signals(run.t, u))
     found = scalars(bursts, "fit")
     assert found["badly_fitted"] == 1.0
     assert found["r_squared"] < 0.5
