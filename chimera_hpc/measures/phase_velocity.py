@@ -101,14 +101,12 @@ def _turns(x: Any, y: Any, x_mean: Any, y_mean: Any, turns: Any) -> None:
     """Write how often each orbit crosses the negative x axis, downwards less upwards."""
     for j in range(x.shape[0]):
         count = 0
-        # Differences from the mean are needed where their signs change only.
-        now = y[j, 0] >= y_mean[j]
+        before_x, before_y = x[j, 0] - x_mean[j], y[j, 0] - y_mean[j]
         for i in range(1, x.shape[1]):
-            above, now = now, y[j, i] >= y_mean[j]
-            if above != now:
-                before_x, before_y = x[j, i - 1] - x_mean[j], y[j, i - 1] - y_mean[j]
-                here_x, here_y = x[j, i] - x_mean[j], y[j, i] - y_mean[j]
+            here_x, here_y = x[j, i] - x_mean[j], y[j, i] - y_mean[j]
+            if (before_y >= 0.0) != (here_y >= 0.0):
                 area = before_x * here_y - before_y * here_x
-                count += above and area > 0.0
-                count -= not above and area < 0.0
+                count += before_y >= 0.0 and area > 0.0
+                count -= before_y < 0.0 and area < 0.0
+            before_x, before_y = here_x, here_y
         turns[j] = count
