@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 EPILOG = """examples:
   python -m chimera_hpc.sweep show results/quickstart P=12 Q=12 seed=3
   python -m chimera_hpc.sweep show results/quickstart P=12 --node 20 --window 2
-  python -m chimera_hpc.sweep show results/quickstart P=12 seed=3 --animate ring.gif
+  python -m chimera_hpc.sweep show results/quickstart P=12 seed=3 --animate film.gif
 
 The run is integrated again by the code that made the sweep, and what comes out is compared with the
 store bit for bit; exit status 1: it comes out otherwise. Values that select one cell and no seed
@@ -55,7 +55,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         node=value("J", int, "node of portrait and spectrum (default: features.reference_node)"),
         window=value("K", int, "window of the spectrum (default: 0)", default=0),
         out=value("DIR", folder_name, "where figures go (default: figures/show)"),
-        animate=value("FILE", Path, "write the ring's motion, .gif or .mp4"),
+        animate=value("FILE", Path, "write the run as a film, .gif or .mp4"),
         periods=value("N", float, "periods of it (default: 5)", default=5.0),
         layout=value("HOW", str, "network: spring, circular, or a file of x, y", default="auto"),
     )
@@ -96,7 +96,7 @@ def execute(args: Namespace) -> int:
     for made in _save(figures, folder, stem):
         print(f"written: {made}")
     if args.animate is not None:
-        _animate(store, focus, args.animate, args.periods)
+        _animate(store, focus, args.animate, args.periods, layout)
     good = all(run.is_same or run.stored is None for run in runs)
     return Exit.COMPLETE if good else Exit.FAILURES
 
@@ -224,9 +224,12 @@ def _save(figures: Mapping[str, Figure], folder: Path, stem: str) -> list[Path]:
         return [save(figure, folder / f"{stem}-{name}")[0] for name, figure in figures.items()]
 
 
-def _animate(store: Store, run: Replay, path: Path, periods: float) -> None:
-    from chimera_hpc.plot.animation import animate_ring
+def _animate(store: Store, run: Replay, path: Path, periods: float, layout: str | Array) -> None:
+    from chimera_hpc.network.layout import node_places
+    from chimera_hpc.plot.animation import animate
+    from chimera_hpc.plot.network_state import Drawing
     from chimera_hpc.reduction.replay import has_nullcline
+    from chimera_hpc.reduction.runs import drawn_network
 
     if not run.is_whole:
         raise BadInput(f"--animate: {run.status.sentence}: there is nothing to show")
@@ -238,7 +241,14 @@ def _animate(store: Store, run: Replay, path: Path, periods: float) -> None:
     first = max(begin, int(np.searchsorted(run.t, run.t[-1] - duration)))
     part = slice(first, None, frame)
     title = ", ".join(run.title.split("\n"))
-    nullcline = has_nullcline(store.sweep)
-    w = run.w[first - begin :: frame]
-    animate_ring(path, run.t[part], run.u.at(part), w, title=title, nullcline=nullcline)
+    network = drawn_network(store.sweep, store.points.row(run.point), lambda line: None)
+    drawing = None
+    if network is not None:
+        drawing = Drawing(network, store.sweep.signals, node_places(network, layout))
+    animate(
+        *(path, run.t[part], run.u.at(part), run.w[first - begin :: frame]),
+        drawing=drawing,
+        title=title,
+        nullcline=has_nullcline(store.sweep),
+    )
     print(f"written: {path}")

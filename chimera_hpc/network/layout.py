@@ -19,6 +19,8 @@ _DENSE = 0.5
 """Share of all pairs that are linked, from which on springs show nothing."""
 _PIVOTS, _SAMPLE, _ROUNDS = 50, 24, 60
 """Nodes to which distances are taken, and the samples and rounds of springs, of large networks."""
+_FEW, _MOST_PARTS = 3, 200
+"""Nodes of parts that are drawn as circles, and the parts after which all are."""
 _MOST_ORDERED = 50_000
 """Most links of a network whose communities are looked for to draw it."""
 
@@ -28,7 +30,8 @@ def node_places(network: Network, layout: str | ArrayLike = "auto") -> Array:
 
     "circular" has them on a circle clockwise from the top, in the order of `picture_order`.
     "spring" draws linked nodes together and pushes others apart: the layout of Fruchterman and
-    Reingold, of more than `MOST_SPRING` nodes a faster one; both are the same in every call.
+    Reingold, of more than `MOST_SPRING` nodes a faster one; both are the same in every call. Parts
+    that are not connected, and nodes without links, lie side by side, the largest at the top left.
     "auto" is circular for rings and dense networks, and spring for others. An array (N0, 2) gives
     the places; they are scaled to fit.
 
@@ -116,30 +119,78 @@ def _places(network: Network, layout: str) -> Array:
         if order is not None:
             places = places[np.argsort(order)]
     else:
-        places = _scaled(_springs(network) if network.n_nodes <= MOST_SPRING else _large(network))
+        places = _scaled(_side_by_side(network))
     places.flags.writeable = False
     return places
 
 
-def _springs(network: Network) -> Array:
+def _side_by_side(network: Network) -> Array:
+    """Return places by springs of each connected part, in squares with sides sqrt(its nodes)."""
+    parts = _parts(network)
+    if len(parts) == 1:
+        return _springs(network.n_nodes, network.links)
+    sides = np.sqrt([len(nodes) for nodes, _ in parts])
+    places = np.empty((network.n_nodes, 2))
+    for rank, ((nodes, links), corner) in enumerate(zip(parts, _corners(sides), strict=True)):
+        few = len(nodes) <= _FEW or rank >= _MOST_PARTS
+        own = _scaled(circle(len(nodes)) if few else _springs(len(nodes), links))
+        places[nodes] = corner + 0.5 * sides[rank] * (1.0 + 0.9 * own)
+    return places * (1.0, -1.0)
+
+
+def _parts(network: Network) -> list[tuple[Integers, Integers]]:
+    """Return the nodes of each connected part, and its links among them; the largest first."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    n, links = network.n_nodes, network.links
+    graph = csr_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
+    _, labels = connected_components(graph, directed=False)
+    sizes = np.bincount(labels)
+    nodes = np.split(np.argsort(labels, kind="stable"), np.cumsum(sizes)[:-1])
+    number = np.empty(n, dtype=np.int64)
+    number[np.concatenate(nodes)] = np.concatenate([np.arange(size) for size in sizes])
+    owner = labels[links[:, 0]]
+    ends = np.cumsum(np.bincount(owner, minlength=len(sizes)))[:-1]
+    own = np.split(number[links[np.argsort(owner, kind="stable")]], ends)
+    return [(nodes[part], own[part]) for part in np.argsort(-sizes, kind="stable")]
+
+
+def _corners(sides: Array) -> Array:
+    """Return corners (k, 2) of squares, the largest first, in rows that fill about a square."""
+    width = max(sides[0], float(np.sqrt(1.2 * (sides**2).sum())))
+    corners = np.empty((len(sides), 2))
+    x = y = high = 0.0
+    for k, side in enumerate(sides.tolist()):
+        if x > 0.0 and x + side > width:
+            x, y, high = 0.0, y + high, 0.0
+        corners[k] = x, y
+        x, high = x + side, max(high, side)
+    return corners
+
+
+def _springs(n_nodes: int, links: Integers) -> Array:
+    """Return places (n_nodes, 2) of one connected part."""
+    if n_nodes > MOST_SPRING:
+        return _large(n_nodes, links)
     from networkx import Graph, spring_layout
 
     graph = Graph()
-    graph.add_nodes_from(range(network.n_nodes))
-    graph.add_edges_from(network.links.tolist())
+    graph.add_nodes_from(range(n_nodes))
+    graph.add_edges_from(links.tolist())
     found = spring_layout(graph, seed=0, iterations=100)
-    return np.array([found[i] for i in range(network.n_nodes)])
+    return np.array([found[i] for i in range(n_nodes)])
 
 
-def _large(network: Network) -> Array:
+def _large(n: int, links: Integers) -> Array:
     """Return places by the distances to some nodes, then by springs with samples of the pushes.
 
     The first is PivotMDS (U. Brandes, C. Pich, Graph Drawing 2006). In each round of the second, a
     node is pushed by `_SAMPLE` others, drawn at random, with a multiple of the force.
     """
     rng = np.random.default_rng(0)
-    places = _scaled(_pivots(network, rng)) + 0.01 * rng.standard_normal((network.n_nodes, 2))
-    n, tail, head = network.n_nodes, *network.links.T
+    places = _scaled(_pivots(n, links, rng)) + 0.01 * rng.standard_normal((n, 2))
+    tail, head = links.T
     length = 1.0 / np.sqrt(n)
     for step in np.geomspace(0.1, 0.002, _ROUNDS):
         apart = places[:, None] - places[rng.integers(n, size=(n, _SAMPLE))]
@@ -155,16 +206,13 @@ def _large(network: Network) -> Array:
     return places
 
 
-def _pivots(network: Network, rng: np.random.Generator) -> Array:
+def _pivots(n: int, links: Integers, rng: np.random.Generator) -> Array:
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    n, links = network.n_nodes, network.links
     graph = csr_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
     chosen = rng.permutation(n)[:_PIVOTS]
     square = dijkstra(graph, directed=False, indices=chosen, unweighted=True).T ** 2
-    far = square[np.isfinite(square)].max(initial=1.0)
-    square = np.where(np.isfinite(square), square, 2.0 * far)
     centred = square - square.mean(axis=0) - square.mean(axis=1, keepdims=True) + square.mean()
     found: Array = centred @ np.linalg.svd(centred.T @ centred)[0][:, :2]
     return found

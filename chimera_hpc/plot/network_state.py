@@ -23,6 +23,7 @@ from chimera_hpc.plot.network import LARGEST_NUMBERED, arrow_heads
 from chimera_hpc.plot.raster import bins
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 MOST_DRAWN = 10_000
 """Most nodes, links or triangles that are drawn; of more, evenly spread ones."""
@@ -81,7 +82,10 @@ def network_states(states: Sequence[NetworkState], layout: str | ArrayLike = "au
         drawing.draw_structure(row[0], state.class_name)
         row[0].set_title("\n".join(filter(None, [state.title, drawing.partly])))
         for frame, (name, colours, _), scale in zip(row[1:], _COLUMNS, scales, strict=True):
-            drawing.draw_values(frame, _feature(state, name), scale, colours)
+            if (values := _feature(state, name)) is None:
+                drawing.draw_nothing(frame)
+            else:
+                drawing.draw_values(frame, values, scale, colours)
     bars[0].set_axis_off()
     for place, (_, colours, label), scale in zip(bars[1:], _COLUMNS, scales, strict=True):
         shown = style.mappable(scale, colours)
@@ -147,21 +151,34 @@ class Drawing:
             self._number(axes, "white" if self.signals == "nodes" else style.BLACK)
         _frame(axes)
 
-    def draw_values(self, axes: Axes, values: Array | None, scale: Normalize, colours: str) -> None:
-        """Draw the network with the values (N_k,) of what carries u as colours."""
+    @property
+    def shown(self) -> Integers:
+        """Numbers of the simplices that carry u and are drawn."""
+        drawn = {"nodes": self._nodes, "links": self._links, "triangles": self._triangles}
+        return drawn[self.signals]
+
+    def draw_values(self, axes: Axes, values: Array, scale: Normalize, colours: str) -> Collection:
+        """Draw the network with the values (N_k,) of what carries u as colours.
+
+        The colours of what is returned are those of the values of `shown`.
+        """
         look: dict[str, Any] = {"cmap": colours, "norm": scale}
-        if values is None:
-            self._add_background(axes)
-            look = {"ha": "center", "va": "top", "color": "#777777", "transform": axes.transAxes}
-            axes.text(0.5, 0.0, "does not oscillate", **look)
-        elif self.signals == "nodes":
+        if self.signals == "nodes":
             self._add_links(axes, colors=_PALE)
-            self._add_nodes(axes, c=values[self._nodes], **look)
+            made = self._add_nodes(axes, c=values[self.shown], **look)
         else:
             self._add_background(axes)
-            some = self._links if self.signals == "links" else self._triangles
             add = self._add_links if self.signals == "links" else self._add_faces
-            add(axes, **look).set_array(values[some])
+            made = add(axes, **look)
+            made.set_array(values[self.shown])
+        _frame(axes)
+        return made
+
+    def draw_nothing(self, axes: Axes) -> None:
+        """Draw the network of a run that has no values."""
+        self._add_background(axes)
+        look: dict[str, Any] = {"ha": "center", "va": "top", "color": "#777777"}
+        axes.text(0.5, 0.0, "does not oscillate", transform=axes.transAxes, **look)
         _frame(axes)
 
     def _add_background(self, axes: Axes) -> None:
@@ -170,13 +187,15 @@ class Drawing:
         if self.network.n_nodes <= _FEW:
             self._add_nodes(axes, color="#777777", s=min(self._dot, 6.0))
 
-    def _add_nodes(self, axes: Axes, **look: Any) -> None:
+    def _add_nodes(self, axes: Axes, **look: Any) -> Collection:
         x, y = self.places[self._nodes].T
         big = len(self._nodes) > _MANY
         given = {"s": self._dot, "zorder": 3.0, "linewidths": 0.0, "rasterized": big, **look}
         if not big and self.signals == "nodes":
             given |= {"edgecolors": style.BLACK, "linewidths": 0.3}
-        axes.scatter(x, y, **given).set_in_layout(False)
+        made = axes.scatter(x, y, **given)
+        made.set_in_layout(False)
+        return made
 
     def _add_links(self, axes: Axes, **look: Any) -> Collection:
         carries = self.signals == "links"

@@ -85,8 +85,11 @@ def test_links_carry_u_and_have_their_pictures(run: Run) -> None:
     assert [len(drawn["marks"]) for drawn in data["networks"]] == [24, 36]
     assert {plate["network"] for plate in data["plates"].values()} == {0, 1}
     assert "links, by community" in page
-    assert main(["show", str(folder), "mean_degree=4", "seed=0", "--layout", "circular"]) == 0
+    film = ["--animate", str(folder / "film.gif"), "--periods", "0.2"]
+    point = ["mean_degree=4", "seed=0"]
+    assert main(["show", str(folder), *point, "--layout", "circular", *film]) == 0
     assert len(list((folder / "figures" / "show").glob("*-network.png"))) == 1
+    assert (folder / "film.gif").is_file()
 
 
 RING_OF_FILES = """

@@ -55,6 +55,22 @@ def test_springs_of_large_networks_do_so_too_the_same_in_every_call(
     np.testing.assert_array_equal(node_places(lattice), first)
 
 
+@pytest.mark.parametrize("largest", [500, 10])
+def test_nodes_without_links_and_other_parts_leave_the_room_to_the_rest(
+    largest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(layout, "MOST_SPRING", largest)
+    clique = [(i, j) for i in range(16) for j in range(i)]
+    places = node_places(Network(32, [(a + 8, b + 8) for a, b in clique] + [(30, 31)]), "spring")
+    clique_places = places[8:24]
+    assert np.ptp(clique_places, axis=0).max() > 0.5 * np.ptp(places, axis=0).max()
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + 9.0 * np.eye(32)
+    assert apart.min() > 0.02
+    low, high = clique_places.min(axis=0), clique_places.max(axis=0)
+    others = np.delete(places, np.s_[8:24], axis=0)
+    assert not ((others >= low) & (others <= high)).all(axis=1).any()
+
+
 def test_large_network_in_pieces_has_finite_places(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(layout, "MOST_SPRING", 4)
     layout._places.cache_clear()

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.animation import PillowWriter
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from PIL import Image
 
 from chimera_hpc import Network
 from chimera_hpc.measures.fourier import FEATURES
+from chimera_hpc.network.layout import node_places
 from chimera_hpc.plot import network_state, style
-from chimera_hpc.plot.network_state import NetworkState, network_states
+from chimera_hpc.plot.animation import animate
+from chimera_hpc.plot.network_state import Drawing, NetworkState, network_states
 from chimera_hpc.plot.ordered import OrderedRows, in_order
 from chimera_hpc.plot.spacetime import space_time
 
@@ -45,6 +51,27 @@ def test_what_carries_u_has_the_colours_of_class_and_features(
         (values,) = [made.get_array() for made in panel.collections if made.get_array() is not None]
         row = FEATURES.index(name)
         np.testing.assert_allclose(values, row + 0.1 * np.arange(SQUARE.size(signals)))
+
+
+@pytest.mark.parametrize("signals", KINDS)
+def test_a_film_shows_the_network_in_the_colours_of_u(
+    signals: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[Any] = []
+
+    def grab(self: PillowWriter, **_: Any) -> None:
+        panel = self.fig.axes[0]
+        (shown,) = [made for made in panel.collections if made.get_array() is not None]
+        assert isinstance(shown, KINDS[signals])
+        seen.append(np.array(shown.get_array()))
+        self._frames.append(Image.new("RGB", (4, 4)))
+
+    monkeypatch.setattr(PillowWriter, "grab_frame", grab)
+    u = np.random.default_rng(0).normal(size=(3, SQUARE.size(signals)))
+    drawing = Drawing(SQUARE, signals, node_places(SQUARE))
+    animate(tmp_path / "film.gif", np.arange(3.0), u, -u, drawing=drawing)
+    np.testing.assert_array_equal(seen, u)
+    assert (tmp_path / "film.gif").is_file()
 
 
 def test_runs_share_the_scale_of_a_feature_and_a_flat_one_looks_flat() -> None:
