@@ -17,12 +17,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import temporary_name
 from chimera_hpc.base.status import Status
 from chimera_hpc.reduction.netcdf3 import Layout, resized
-from chimera_hpc.reduction.results import TRIPLET
-from chimera_hpc.store.labelled import open_sweep
+from chimera_hpc.store.labelled import open_sweep, reductions
 from chimera_hpc.store.store import Store
 from chimera_hpc.store.strips import PackedSeries
 
@@ -40,7 +38,7 @@ _BUNDLED = ("results.json", "report.html", "run.log")
 
 
 def to_csv(store: Store, target: Path, series: bool = False) -> None:
-    """Write one line per point: parameters, status, triplet, class in each cut that was made."""
+    """Write one line per point: parameters, status, scalars, class in each cut that was made."""
     with _replaced(target) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.writelines(table(store))
 
@@ -186,9 +184,8 @@ def to_bundle(store: Store, target: Path, series: bool = False) -> None:
 def table(store: Store) -> Iterator[str]:
     """Yield the table of `to_csv` as text, some lines at a time."""
     columns: dict[str, NDArray[Any]] = dict(store.points.columns)
-    ledger, scalars = store.ledger(), store.scalars()
-    columns["status"] = _STATUS_NAMES[ledger["status"]]
-    columns |= {name: scalars[name] for name in TRIPLET}
+    columns["status"] = _STATUS_NAMES[store.ledger()["status"]]
+    columns |= {name: _spoken(name, values) for name, values in store.scalars().items()}
     columns |= _classes(store)
     yield _lines([[*columns]])
     for first in range(0, store.n_points, _SLICE_ROWS):
@@ -202,19 +199,20 @@ def _lines(rows: Iterable[Iterable[Any]]) -> str:
     return text.getvalue()
 
 
+def _spoken(name: str, values: NDArray[np.float64]) -> NDArray[Any]:
+    """Return a scalar as it is, the status under another convention in words."""
+    return _STATUS_NAMES[np.nan_to_num(values, nan=255).astype(int)] if "status" in name else values
+
+
 def _classes(store: Store) -> dict[str, NDArray[Any]]:
-    """Return each point's class in each cut of the last reduction, if that covers all points."""
-    try:
-        reduction = store.reduction()
-    except BadInput:
-        return {}
+    """Return each point's class in each cut of the last reductions."""
     classes = {}
-    for cut in reduction.attributes.get("cuts", []):
-        labels = reduction.arrays[f"labels_{cut}"]
-        # The label -1 of points without a class takes the last name.
-        names = np.array([*reduction.attributes[f"names_{cut}"], ""])
-        if len(labels) == store.n_points:
-            classes[f"class_{cut}"] = names[np.maximum(labels, -1)]
+    for suffix, reduction in reductions(store):
+        for cut in reduction.attributes.get("cuts", []):
+            # The label -1 of points without a class takes the last name.
+            names = np.array([*reduction.attributes[f"names_{cut}"], ""])
+            labels = reduction.arrays[f"labels_{cut}"]
+            classes[f"class_{cut}{suffix}"] = names[np.maximum(labels, -1)]
     return classes
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
+from chimera_hpc.job.registry import measures
+from chimera_hpc.measures.conventions import PRESETS
+from chimera_hpc.store.reduction import StoredReduction, read_reduction
 from chimera_hpc.store.store import Store
 
 if TYPE_CHECKING:
@@ -38,7 +42,8 @@ def open_sweep(path: str | Path) -> xr.Dataset:
         of the point's combination of all parameters but the seed:
         ``set_index(point=["cell", "seed"]).unstack()`` makes them dimensions. For each cut k
         of the reduction, ``class_k(point)`` is the class of a run and ``modal_class_k(point)`` that
-        of its cell, as texts, empty where there is none. `u` and features are read when used. The
+        of its cell, as texts, empty where there is none; those of another convention of the panel
+        end as its scalars do, ``class_k_printed``. `u` and features are read when used. The
         attribute `units` of each variable is its unit.
 
     Raises
@@ -84,35 +89,48 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     for name, columns in tables.items():
         for label, unit in _labels(stored[name]):
             dataset[label] = ("point", columns[label], _attributes(label, unit))
-    return dataset.assign(_classes(store, ledger["status"]))
+    return dataset.assign(_classes(store, ledger["status"], tables["scalars"]))
+
+
+def reductions(store: Store) -> Iterator[tuple[str, StoredReduction]]:
+    """Yield what the last reduction stored under each convention that the sweep measures.
+
+    With each comes the end of the convention's names, as in ``V_theta_printed``: nothing for the
+    sweep's own. A reduction that does not cover all points, as the sweep was extended, is left out.
+    """
+    panel = store.sweep.measures.panel
+    for name in ("", *(name for name in panel if name in PRESETS)):
+        suffix = (
+            measures([name])[0].labels(store.sweep.features)[0][len("V_theta") :] if name else ""
+        )
+        with suppress(BadInput):
+            found = read_reduction(store.path.parent / name if name else store.path)
+            if found.arrays["cell"].shape == (store.n_points,):
+                yield suffix, found
 
 
 def _classes(
-    store: Store, status: NDArray[np.int64]
+    store: Store, status: NDArray[np.int64], scalars: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, tuple[str, NDArray[np.str_], dict[str, str]]]:
-    """Return the classes of runs and cells in each cut of the last reduction."""
-    try:
-        reduction = store.reduction()
-    except BadInput:
-        return {}
-    arrays, classes = reduction.arrays, {}
-    for cut in reduction.attributes.get("cuts", []):
-        labels, modal = arrays[f"labels_{cut}"], arrays[f"modal_class_{cut}"]
-        if len(labels) != store.n_points:
-            continue  # the sweep was extended since
-        names = np.array([*reduction.attributes[f"names_{cut}"], ""])  # ends: steady, no_window, ""
-        still = np.where(status == Status.STEADY, -3, np.where(status == Status.NO_WINDOW, -2, -1))
-        own = np.where(labels < 0, still, labels)
-        classes[f"class_{cut}"] = (
-            "point",
-            names[own],
-            {"long_name": f"class of the run, {cut} clusters"},
-        )
-        classes[f"modal_class_{cut}"] = (
-            "point",
-            names[modal[arrays["cell"]]],
-            {"long_name": f"most frequent class of the cell, {cut} clusters"},
-        )
+    """Return the classes of runs and cells in each cut of the last reductions."""
+    classes = {}
+    for suffix, reduction in reductions(store):
+        arrays = reduction.arrays
+        codes = scalars.get(f"status{suffix}", status)
+        still = np.where(codes == Status.STEADY, -3, np.where(codes == Status.NO_WINDOW, -2, -1))
+        for cut in reduction.attributes.get("cuts", []):
+            labels, modal = arrays[f"labels_{cut}"], arrays[f"modal_class_{cut}"]
+            # The names end with those of runs without a class: steady, no_window, "".
+            names = np.array([*reduction.attributes[f"names_{cut}"], ""])
+            for name, what, own in (
+                (f"class_{cut}{suffix}", "class of the run", np.where(labels < 0, still, labels)),
+                (
+                    f"modal_class_{cut}{suffix}",
+                    "most frequent class of the cell",
+                    modal[arrays["cell"]],
+                ),
+            ):
+                classes[name] = "point", names[own], {"long_name": f"{what}, {cut} clusters"}
     return classes
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.registry import DEFAULT_PANEL
 from chimera_hpc.measures.conventions import PRESETS
@@ -55,6 +58,30 @@ def test_the_second_triplet_is_that_of_the_stored_series(both: Path) -> None:
         stored = [scalars[f"V_{name}_printed"][i] for name in ("theta", "a", "Omega")]
         assert stored == pytest.approx(total_variations(found), abs=1e-9)
         assert scalars["status_printed"][i] == found.status
+
+
+def test_exports_hold_all_measures_and_the_classes_under_both(both: Path) -> None:
+    store = Store.open(both / "store.zarr")
+    for name in ("table.csv", "sweep.nc"):
+        assert main(["export", str(both), "--to", str(both / name)]) == 0
+    with (both / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    with xr.open_dataset(both / "sweep.nc") as data:
+        for name, values in store.scalars().items():
+            np.testing.assert_array_equal(data[name], values)
+            if name != "status_printed":
+                found = [float(row[name] or "nan") for row in rows]
+                np.testing.assert_array_equal(found, values)
+        for suffix, folder in (("", ""), ("_printed", "paper-printed")):
+            stored = stored_reduction(both, folder)
+            for cut in stored.attributes["cuts"]:
+                name, labels = f"class_{cut}{suffix}", stored.arrays[f"labels_{cut}"]
+                names = [*stored.attributes[f"names_{cut}"], ""]
+                assert [row[name] for row in rows] == [names[max(k, -1)] for k in labels]
+                among = data[name].values[labels >= 0].astype(str)
+                assert among.tolist() == [names[k] for k in labels if k >= 0]
+    words = {row["status_printed"] for row in rows}
+    assert words <= {status.name.lower() for status in Status}
 
 
 def test_all_runs_are_clustered_under_it_and_the_first_results_stay(
