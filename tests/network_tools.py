@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.network.network import Network
 
 Array = NDArray[np.float64]
@@ -58,3 +61,11 @@ def dense_dirac(network: Network, k: int) -> Array:
     root = np.ones(network.n_links) if network.weights is None else np.sqrt(network.weights)
     b_1, b_2 = b_1 * root, b_2 / root[:, None]
     return [b_1, np.hstack([b_1.T, b_2]), b_2.T][k]
+
+
+def refusal(make: Callable[[], object]) -> str:
+    """Return the one line with which bad input is refused."""
+    with pytest.raises(BadInput) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+    return str(caught.value)

@@ -57,18 +57,6 @@ class KuramotoSakaguchi(PhaseModel):
     name = "kuramoto_sakaguchi"
     which = "adjacency"
 
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        self._finite("coupling", "phase_lag")
-        self._each("omega", self.omega)
-
-    @property
-    def right_hand_side(self) -> Any:
-        """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
-        from chimera_hpc.models.phase_kernels import compiled
-
-        return compiled(self.name)
-
     @cached_property
     def lane_params(self) -> Array:
         """This trajectory's column: K cos(alpha), K sin(alpha), omega, and work space."""

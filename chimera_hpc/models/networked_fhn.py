@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.models.network_model import NodeModel
 from chimera_hpc.models.networked_fhn_network import on_network
 from chimera_hpc.models.parameters import (
     EPSILON,
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class NetworkedFHN:
+class NetworkedFHN(NodeModel):
     r"""A ring of FitzHugh-Nagumo oscillators coupled through both variables (eq. (F1)).
 
     .. math::
@@ -63,16 +64,6 @@ class NetworkedFHN:
             raise BadInput(f"epsilon = {self.epsilon}: must be above 0")
 
     @property
-    def n_rows(self) -> int:
-        """Number of integrated variables, 2 N0."""
-        return 2 * self.n_nodes
-
-    @property
-    def n_second(self) -> int:
-        """Number of second variables y in an initial state."""
-        return self.n_nodes
-
-    @property
     def lane_group(self) -> tuple[Any, ...]:
         """Key that trajectories must share to run as lanes of one kernel call."""
         return (self.name, self.n_nodes, self.half_degree)
@@ -95,24 +86,6 @@ class NetworkedFHN:
         gain = self.sigma / (2 * self.half_degree)
         same, cross = gain * math.cos(self.phi), gain * math.sin(self.phi)
         return np.array([1.0 / self.epsilon, self.b, same, cross])
-
-    def state(self, u: Array, v: Array) -> Array:
-        """Integrated variables of a state given by x and y, both (N0,)."""
-        return np.concatenate([u, v])
-
-    def node_pair(self, rows: Array) -> tuple[Array, Array]:
-        """The two signals x and y from rows (n_rows, ...)."""
-        return rows[: self.n_nodes], rows[self.n_nodes :]
-
-    def second_variable(self, rows: Array, v0: Array, t: Array) -> Array:
-        """The variables y, shape (T, N0), from rows (n_rows, T)."""
-        return rows[self.n_nodes :].T
-
-    def equilibrium(self, which: Literal["origin", "upper", "lower"]) -> tuple[float, float]:
-        """Centre (x, y) of the ball of initial states; "origin" is the only one."""
-        if which != "origin":
-            raise BadInput(f'integrator.centre = "{which}": networked_fhn knows "origin" only')
-        return 0.0, 0.0
 
 
 def _build(sweep: Any, row: Row) -> NetworkedFHN:

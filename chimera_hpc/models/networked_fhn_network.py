@@ -56,17 +56,10 @@ class NetworkFHN(NetworkModel):
 
     def __post_init__(self) -> None:
         """Check the numbers, and that every node has a degree."""
-        self._finite("sigma", "epsilon", "b", "phi")
+        super().__post_init__()
         if not self.epsilon > 0.0:
             raise BadInput(f"epsilon = {self.epsilon}: must be above 0")
         _ = self.packed
-
-    @property
-    def right_hand_side(self) -> Any:
-        """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
-        from chimera_hpc.models.planar_kernels import compiled
-
-        return compiled(self.name)
 
     @cached_property
     def lane_params(self) -> Array:

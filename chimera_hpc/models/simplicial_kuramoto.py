@@ -87,8 +87,7 @@ class SimplicialKuramoto(PhaseModel):
                 f"explosive needs simplices of the dimensions {self.order - 1} and "
                 f"{self.order + 1} in the network: with_triangles adds triangles"
             )
-        self._finite("coupling")
-        self._each("omega", self.omega)
+        super().__post_init__()
 
     @property
     def n_nodes(self) -> int:
@@ -114,11 +113,9 @@ class SimplicialKuramoto(PhaseModel):
         return (self.name, self.explosive, self.packed.key)
 
     @property
-    def right_hand_side(self) -> Any:
-        """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
-        from chimera_hpc.models.phase_kernels import compiled
-
-        return compiled("explosive" if self.explosive else self.name)
+    def formula(self) -> str:
+        """Name of the right-hand side in `phase_kernels`."""
+        return "explosive" if self.explosive else self.name
 
     @cached_property
     def lane_params(self) -> Array:

@@ -60,18 +60,6 @@ class StuartLandau(NetworkModel):
 
     name = "stuart_landau"
 
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        self._finite("coupling", "phase_lag", "growth", "shear")
-        self._each("omega", self.omega)
-
-    @property
-    def right_hand_side(self) -> Any:
-        """Compiled right-hand side ``rhs(y, dy, lane_params, int_params)``."""
-        from chimera_hpc.models.planar_kernels import compiled
-
-        return compiled(self.name)
-
     @cached_property
     def lane_params(self) -> Array:
         """This trajectory's column: four numbers, omega, and work space."""
