@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -98,8 +98,8 @@ class ClassNumber:
         return f"{n} of {self.n_runs} {what} look like {k} classes{apart} ({each})"
 
 
-def class_number(points: Floats, seed: int = 0) -> ClassNumber:
-    """Judge how many classes points (n, d), one a run, hold.
+def class_number(points: Floats, seed: int = 0, least: ArrayLike = 0.0) -> ClassNumber:
+    """Judge how many classes points (n, d), one a run, hold; `least` as in `tree.limits`.
 
     Of more than 1,000 points a random 1,000 are judged. The same points give the same answer.
     """
@@ -107,9 +107,9 @@ def class_number(points: Floats, seed: int = 0) -> ClassNumber:
     chosen = points[np.lexsort(points.T)]
     if len(chosen) > _MOST_POINTS:
         chosen = chosen[np.sort(rng.choice(len(chosen), _MOST_POINTS, replace=False))]
-    apart = far_from_others(chosen)
+    apart = far_from_others(chosen, least)
     kept = chosen[~apart]
-    scaled = tree.scale(kept, tree.limits(kept))
+    scaled = tree.scale(kept, tree.limits(kept, least))
     most = max(1, min(MOST, len(np.unique(scaled, axis=0)), len(scaled) - 1))
     labels = _cuts(scaled, most)
     gap, error = _gap(scaled, labels, rng)
@@ -123,9 +123,9 @@ def class_number(points: Floats, seed: int = 0) -> ClassNumber:
     )
 
 
-def far_from_others(points: Floats) -> NDArray[np.bool_]:
+def far_from_others(points: Floats, least: ArrayLike = 0.0) -> NDArray[np.bool_]:
     """Tell which points (n, d) have fewer neighbours than a class has members."""
-    scaled = tree.scale(points, tree.limits(points))
+    scaled = tree.scale(points, tree.limits(points, least))
     members = max(3, int(np.ceil(SMALLEST * len(scaled))))
     if len(scaled) <= 2 * members:
         return np.zeros(len(scaled), dtype=np.bool_)

@@ -97,6 +97,7 @@ def classify(
     names: naming.Rule = "triplet",
     largest_tree: int | None = None,
     known: tuple[Floats, Integers] | None = None,
+    least: ArrayLike = 0.0,
 ) -> Classification:
     """Cluster the points that have a triplet (see `has_triplet`) and name the clusters.
 
@@ -124,6 +125,7 @@ def classify(
         `Classification.sampled` is true.
     known : linkage and members of an earlier classification of the same points. The tree is then
         not built again.
+    least : smallest range that is stretched to [0, 1], see `tree.limits`.
 
     Notes
     -----
@@ -146,7 +148,7 @@ def classify(
     clustered = np.flatnonzero(has_triplet(points, status))
     if not np.isfinite(points[clustered]).all():
         raise ValueError("a point with status DONE has a triplet that is not finite")
-    scaler = tree.limits(points[clustered])
+    scaler = tree.limits(points[clustered], least)
     scaled = tree.scale(points[clustered], scaler)
     if known is None:
         leaves = _sample(scaled, largest_tree or LARGEST_TREE[linkage])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.cluster import hierarchy
 from scipy.spatial.distance import pdist
 
@@ -19,11 +19,16 @@ MOST_BY_SCIPY = 4_000
 """Most points for which SciPy builds Ward's tree; it then takes 64 MB."""
 
 
-def limits(points: Floats) -> Floats:
-    """Return the smallest and largest value of each column, shape (2, n_columns)."""
+def limits(points: Floats, least: ArrayLike = 0.0) -> Floats:
+    """Return the smallest and largest value of each column, shape (2, n_columns).
+
+    They are at least `least` apart, which may be one number per column: smaller ranges, of noise,
+    say, are then not stretched to those of other columns.
+    """
     if len(points) == 0:
         return np.zeros((2, points.shape[1]))
-    return np.stack([points.min(axis=0), points.max(axis=0)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.stack([low, np.maximum(high, low + np.asarray(least, dtype=np.float64))])
 
 
 def scale(points: Floats, scaler: Floats) -> Floats:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
+import numpy as np
+
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.cli.arguments import STORE, add, load_job, sweep_folder
 from chimera_hpc.cli.deciding import plan_line
@@ -12,6 +14,7 @@ from chimera_hpc.cli.run import check_drawing
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.class_names import overridden
 from chimera_hpc.job.models import build
+from chimera_hpc.network.sweep_network import network_of
 
 EPILOG = """examples:
   python -m chimera_hpc.sweep plan jobs/quickstart.toml
@@ -53,7 +56,13 @@ def execute(args: Namespace) -> int:
 
 
 def _coupling(sweep: Sweep) -> str:
-    """Return how a slope of the first point is computed, which its network decides."""
-    model = build(sweep, sweep.points().row(0))
-    kernel = getattr(model, "kernel", "the model's own right-hand side")
-    return f"the first point by {kernel}"
+    """Return the network of the first point, and how a slope is computed there."""
+    row = sweep.points().row(0)
+    kernel = getattr(build(sweep, row), "kernel", "the model's own right-hand side")
+    network = network_of(sweep, row)
+    alone = np.setdiff1d(np.arange(network.n_nodes), network.links)
+    size = f"the first point {network.n_nodes} nodes, {network.n_links} links"
+    if len(alone):
+        first = ", nodes count from 0" if alone[0] == 0 else ""
+        size += f", {len(alone)} nodes without any ({alone[0]}{', ...' * (len(alone) > 1)}{first})"
+    return f"{size}, by {kernel}"

@@ -63,7 +63,10 @@ def checked_links(n_nodes: int, links: ArrayLike, directed: bool = False) -> Int
 
 def checked_weights(weights: ArrayLike, n_links: int) -> Array:
     """Return the weights of links, shape (N1,). They must be finite."""
-    found = np.asarray(weights, dtype=np.float64)
+    try:
+        found = np.asarray(weights, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"weights must be real numbers: {error}") from None
     if found.shape != (n_links,):
         raise BadInput(f"weights have shape {found.shape}: expected is ({n_links},), one per link")
     wrong = ~np.isfinite(found)

@@ -172,8 +172,14 @@ class SimplicialComplex:
         )
 
     def reorient(self, links: Integers) -> Self:
-        """Reverse the links with the given indices."""
+        """Reverse the links with the given indices.
+
+        Raises BadInput: a directed network, or an index that is no link's.
+        """
         self._refuse_directed("reorientation")
+        wrong = np.setdiff1d(links, np.arange(self.n_links))
+        if len(wrong):
+            raise BadInput(f"link {wrong[0]}: allowed is 0 to {self.n_links - 1}")
         turned = self.links.copy()
         turned[links] = turned[links, ::-1]
         return self._with(links=turned)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -44,17 +46,14 @@ def _edge_list(path: Path, directed: bool | None) -> Parts:
 
     A square table of more than three columns is an adjacency matrix.
     """
-    rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), start=1):
-        text = line.partition("#")[0].strip()
-        if text:
-            cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t]|\s+", text)]
-            rows.append((number, [cell for cell in cells if cell]))
+    rows = _rows(path.read_text(encoding="utf-8-sig").splitlines())
     if rows and _is_header(rows[0][1]):
         rows = rows[1:]
     if len(rows) > 3 and {len(cells) for _, cells in rows} == {len(rows)}:
         matrix = [[_weight(number, cell) for cell in cells] for number, cells in rows]
         return interchange.from_adjacency(np.array(matrix), directed)
+    if not rows:
+        raise BadInput("holds no links")
     for number, cells in rows:
         if len(cells) not in (2, 3) or len(cells) != len(rows[0][1]):
             raise BadInput(
@@ -63,10 +62,39 @@ def _edge_list(path: Path, directed: bool | None) -> Parts:
             )
     names = _numbers([name for _, cells in rows for name in cells[:2]])
     weights = None
-    if rows and len(rows[0][1]) == 3:
+    if len(rows[0][1]) == 3:
         weights = np.array([_weight(number, cells[2]) for number, cells in rows])
     edges = np.array(names, dtype=np.int64).reshape(-1, 2)
     return interchange.from_edges(edges, None, weights, bool(directed))
+
+
+def _rows(lines: list[str]) -> list[tuple[int, list[str]]]:
+    """Return the number of each line that is not empty, and its cells.
+
+    Numbers may have any mixture of separators between them. Names may hold blanks where all lines
+    have a tab, a semicolon or a comma, and any of these between quotes.
+    """
+    texts = [(number, line.partition("#")[0].strip()) for number, line in enumerate(lines, start=1)]
+    texts = [(number, text) for number, text in texts if text]
+    cells = [re.split(r"[,;\t]|\s+", text) for _, text in texts]
+    if not all(map(_is_number, filter(None, chain(*cells[1:])))):
+        sign = next((s for s in "\t;," if all(s in text for _, text in texts)), None)
+        if sign is not None:
+            cells = [_quoted(text, sign) for _, text in texts]
+    return [
+        (number, [cell.strip().strip('"') for cell in row if cell.strip()])
+        for (number, _), row in zip(texts, cells, strict=True)
+    ]
+
+
+def _quoted(line: str, sign: str) -> list[str]:
+    return next(csv.reader([line], delimiter=sign, skipinitialspace=True))
+
+
+def _is_number(text: str) -> bool:
+    return (
+        re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf", text.strip('"')) is not None
+    )
 
 
 def _is_header(cells: list[str]) -> bool:
@@ -108,6 +136,7 @@ def _json(path: Path, directed: bool | None) -> Parts:
     data = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(data, dict) or "nodes" not in data:
         raise BadInput('expected is an object with "nodes" and "links" or "edges" (node-link)')
+    data.setdefault("multigraph", False)  # as of D3 and others, which do not say
     return _graph(node_link_graph(data, edges="edges" if "edges" in data else "links"), directed)
 
 

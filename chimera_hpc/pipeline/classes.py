@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
@@ -35,6 +35,9 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
     classifier : {"agglomerative", "kmeans", "mixture", "hdbscan"}
     linkage : {"ward", "average", "complete"}
         Of the tree.
+    least : float or array_like, shape (columns,)
+        Smallest range of a column that is stretched to [0, 1]: noise of a column that is smaller
+        makes no classes then.
 
     Attributes
     ----------
@@ -42,7 +45,8 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
         Position of each run's class in `names_`; -1 for none.
     names_ : tuple of str
     scaler_ : array, shape (2, columns)
-        Smallest and largest value of each column, which are scaled to 0 and 1.
+        What is scaled to 0 and 1: the smallest and the largest value of each column, or `least`
+        above the smallest.
     atlas_ : Atlas
         The runs in scaled space, by which `predict` judges.
     """
@@ -54,11 +58,13 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
         names: str | Sequence[str] = "letters",
         classifier: Classifier = "agglomerative",
         linkage: Linkage = "ward",
+        least: float | ArrayLike = 0.0,
     ) -> None:
         self.n = n
         self.names = names
         self.classifier = classifier
         self.linkage = linkage
+        self.least = least
 
     def fit(self, X: Any, y: Any = None) -> Self:
         """Cluster runs (runs, columns)."""
@@ -73,6 +79,7 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
             classifier=self.classifier,
             cuts=(self.n,),
             names=self.names,
+            least=self.least,
         )
         cut = made.cuts[self.n]
         self.labels_, self.names_, self.atlas_ = cut.labels, cut.names, Atlas.of(made, cut)

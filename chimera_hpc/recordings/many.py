@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 Clusters = int | Literal["auto"]
 FEWEST = 10
 """Oscillating recordings from which their classes are counted."""
+LEAST = 0.05
+"""Smallest range of V_theta that is stretched to [0, 1], and those of V_a and V_Omega as shares of
+the amplitude and of the frequency: what varies less is noise, and makes no classes."""
 QUANTITIES = ("V_theta", "V_a", "V_Omega", "frequency", "amplitude", "samples_per_period")
 
 
@@ -103,14 +106,16 @@ def _clustered(files: tuple[Recorded, ...], clusters: Clusters) -> Collection:
     triplets = np.array([one.found.triplet for one in files])
     known = np.flatnonzero(np.isfinite(triplets).all(axis=1))
     n, kept, sentence = clusters, known, f"{len(known)} of {len(files)} recordings oscillate"
+    sizes = np.array([[1.0, *_medians(files[i])] for i in known]).reshape(-1, 3)
+    least = LEAST * np.median(sizes, axis=0) if len(known) else np.zeros(3)
     if n == "auto":
-        n, kept, sentence = _counted(triplets, known)
+        n, kept, sentence = _counted(triplets, known, least)
     elif len(known) < n:
         raise BadInput(f"--clusters {n}: {sentence}")
     names: list[str | None] = [one.found.name for one in files]
     confidence = np.full(len(files), np.nan)
     if len(kept):
-        made = ChimeraClasses(n).fit(triplets[kept])
+        made = ChimeraClasses(n, least=least).fit(triplets[kept])
         sure = silhouettes(tree.scale(triplets[kept], made.scaler_), made.labels_)
         confidence[kept] = np.maximum(sure, 0.0)
         for i, label in zip(kept.tolist(), made.labels_.tolist(), strict=True):
@@ -119,14 +124,14 @@ def _clustered(files: tuple[Recorded, ...], clusters: Clusters) -> Collection:
 
 
 def _counted(
-    triplets: NDArray[np.float64], known: NDArray[np.int64]
+    triplets: NDArray[np.float64], known: NDArray[np.int64], least: NDArray[np.float64]
 ) -> tuple[int, NDArray[np.int64], str]:
     """Return the number of classes, the recordings that are in one, and both in words."""
     if len(known) < FEWEST:
         few = f"{len(known)} oscillating recordings are too few to count classes"
         return 1, known, f"{few}: {FEWEST} are needed, or --clusters N"
-    found = class_number(triplets[known])
-    apart = far_from_others(triplets[known])
+    found = class_number(triplets[known], least=least)
+    apart = far_from_others(triplets[known], least)
     return found.answer, known[~apart], found.said("recordings")
 
 
@@ -203,6 +208,11 @@ def as_dataset(made: Collection) -> xr.Dataset:
 
 
 def _values(one: Recorded) -> list[float]:
-    features, samples = one.found.features, one.found.samples_a_period
-    medians = [float(np.median(features.frequency)), float(np.median(features.amplitude))]
-    return [*one.found.triplet, *medians, samples]
+    amplitude, frequency = _medians(one)
+    return [*one.found.triplet, frequency, amplitude, one.found.samples_a_period]
+
+
+def _medians(one: Recorded) -> tuple[float, float]:
+    """Return the medians over the nodes of amplitude and frequency."""
+    features = one.found.features
+    return float(np.median(features.amplitude)), float(np.median(features.frequency))

@@ -329,6 +329,35 @@ def test_what_is_no_network_is_refused_in_one_line(
     assert refusal(make).startswith(message)
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.csv", "New York,Los Angeles\nLos Angeles, San Juan\n"),
+        ("a.csv", '"New York, NY",Los Angeles\nLos Angeles,San Juan\n'),
+        ("a.tsv", "source\ttarget\nNew York\tLos Angeles\nLos Angeles\tSan Juan\n"),
+        ("a.txt", "1 , 2\n2;3\n"),
+        (
+            "a.json",
+            '{"nodes":[{"id":7},{"id":5},{"id":6}],"links":[{"source":7,"target":5},'
+            '{"source":5,"target":6}]}',
+        ),
+    ],
+)
+def test_names_may_hold_blanks_and_json_need_not_say_what_it_is(
+    name: str, text: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    links = Network.from_file(tmp_path / name).links
+    first = 1 if name == "a.txt" else 0
+    np.testing.assert_array_equal(links, [[first, first + 1], [first + 1, first + 2]])
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "source,target\n"])
+def test_list_without_links_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    assert refusal(lambda: Network.from_file(tmp_path / "a.csv")).endswith("holds no links")
+
+
 @given(st.text(alphabet="01, \n;#ab.-", max_size=40))
 def test_any_text_is_read_or_refused_as_bad_input(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:

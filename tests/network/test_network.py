@@ -228,6 +228,9 @@ ARROW = Network(2, [(0, 1)], directed=True)
             lambda: ARROW.with_triangles("cliques"),
             "a directed network has no orientation, which tri",
         ),
+        (lambda: Network(2, [(0, 1)], ["far"]), "weights must be real numbers: could not"),
+        (lambda: Network(2, [(0, 1)], [1j]), "weights must be real numbers: float() argument"),
+        (lambda: Network(2, [(0, 1)]).reorient([1]), "link 1: allowed is 0 to 0"),
         (lambda: ARROW.reorient_random(1), "a directed network has no orientation, which reorient"),
     ],
 )

@@ -21,18 +21,25 @@ T = 0.02 * np.arange(1000)
 N = 16
 
 
-def kind_of_ring(kind: int, rng: np.random.Generator) -> Array:
-    """A wave, a wave next to drifting nodes of all sizes, or random phases; with noise."""
-    half = N // 2
-    phase = 2 * np.pi * np.arange(N) / N + rng.normal(scale=0.05, size=N)
-    speed, size = np.ones(N), np.ones(N)
+def kind_of_ring(kind: int, rng: np.random.Generator, n: int = N) -> Array:
+    """A wave, a wave next to drifting nodes of all sizes, or random phases; with noise.
+
+    3 and 4 differ from these in their phases only: half a wave, and neighbours in antiphase.
+    """
+    half = n // 2
+    phase = 2 * np.pi * np.arange(n) / n + rng.normal(scale=0.05, size=n)
+    speed, size = np.ones(n), np.ones(n)
     if kind == 1:
         phase[half:] = rng.uniform(-np.pi, np.pi, half)
         speed[half:] += rng.uniform(0.05, 0.4, half)
         size[half:] = rng.uniform(0.5, 1.5, half)
     elif kind == 2:
-        phase = rng.uniform(-np.pi, np.pi, N)
-    noise = 0.02 * rng.normal(size=(len(T), N))
+        phase = rng.uniform(-np.pi, np.pi, n)
+    elif kind == 3:
+        phase[half:] = rng.uniform(-np.pi, np.pi, half)
+    elif kind == 4:
+        phase = rng.normal(scale=0.05, size=n) + np.pi * (np.arange(n) % 2)
+    noise = 0.02 * rng.normal(size=(len(T), n))
     return size * np.cos(2 * np.pi * speed * T[:, None] + phase) + noise
 
 
@@ -57,6 +64,17 @@ def test_forty_recordings_of_three_kinds_are_three_classes(tmp_path: Path) -> No
     assert found.value.sel(quantity="frequency").values[::3] == pytest.approx(1.0, abs=0.03)
     assert float(found.confidence.min()) >= 0.0
     assert float(found.confidence.median()) > 0.6
+
+
+@pytest.mark.parametrize("three", [(0, 3, 2), (0, 4, 2)])
+def test_kinds_that_differ_in_phase_only_are_found(three: tuple[int, ...], tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    kinds = [three[i % 3] for i in range(40)]
+    for i, kind in enumerate(kinds):
+        np.savez(tmp_path / f"{i:02d}.npz", t=T, u=kind_of_ring(kind, rng, 50))
+    found = classify_recordings(tmp_path)
+    assert found.sentence.startswith("40 of 40 recordings look like 3 classes")
+    assert adjusted_rand(found["class"].values.tolist(), kinds) > 0.9
 
 
 def test_recordings_of_one_kind_are_one_class(tmp_path: Path) -> None:
