@@ -3,23 +3,31 @@
     PYTHONPATH=. python tests/bench/large.py
 
 prints seconds of processor per accepted step of eight trajectories, and per stored entry of L_0.
+Then, for small worlds in each cache, the cost of a stored entry in a slope of eight lanes (what ten
+more neighbours cost), over a bare loop that adds the same eight numbers node by node.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 
 from chimera_hpc import Network, TopologicalFHN
+from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.lanes import Control, Outcome, integrate
-from chimera_hpc.integrate.simd import LANES
+from chimera_hpc.integrate.scratch import aligned
+from chimera_hpc.integrate.simd import LANES, broadcast, load, store
 
 SIZES = (1_000, 10_000, 100_000)
 LINKS_EACH = 4
 REPEATS = 5
+WORLDS = (64, 200, 2_000, 20_000)
+"""Nodes: eight lanes of u take 4 kB to 1.3 MB."""
+ROWS = 10**6
+"""Rows, or entries, per measurement."""
 
 
 def measured() -> Iterator[tuple[Network, int, float]]:
@@ -39,6 +47,52 @@ def measured() -> Iterator[tuple[Network, int, float]]:
         yield network, max(steps), min(seconds)
 
 
+@jit()
+def _bare(y, rows, times, out):
+    """Add eight lanes of all rows, in four sums."""
+    zero = broadcast(0.0)
+    a, b, c, d = zero, zero, zero, zero
+    for _ in range(times):
+        for i in range(0, rows, 4):
+            a, b = a + load(zero, y, i), b + load(zero, y, i + 1)
+            c, d = c + load(zero, y, i + 2), d + load(zero, y, i + 3)
+    store(out, 0, (a + b) + (c + d))
+
+
+def _least(run: Callable[[], object]) -> float:
+    """Return the least seconds of processor of `REPEATS` calls after one."""
+    seconds = []
+    for _ in range(1 + REPEATS):
+        begin = time.process_time()
+        run()
+        seconds.append(time.process_time() - begin)
+    return min(seconds[1:])
+
+
+def _often(run: Callable[[], object], times: int) -> None:
+    for _ in range(times):
+        run()
+
+
+def entry_and_row(n: int) -> tuple[float, float]:
+    """Return the seconds per stored entry of a slope, and per row of the bare loop."""
+    y, slopes = aligned(2 * n, LANES), aligned(2 * n, LANES)
+    y[:] = np.random.default_rng(0).random(y.shape)
+    seconds, entries = [], []
+    for half in (5, 10):
+        network = Network.small_world(n, half, 0.1, seed=1)
+        model = TopologicalFHN(network, 0.05, 0.5, -0.01)
+        rhs, ints = model.right_hand_side, model.int_params
+        params = np.repeat(model.lane_params[:, None], LANES, axis=1)
+        entries.append(network.laplacian(0).nnz)
+        times = max(1, ROWS // entries[-1])
+        slope = partial(rhs, y, slopes, params, ints)
+        seconds.append(_least(partial(_often, slope, times)) / times)
+    times = max(1, ROWS // n)
+    bare = _least(partial(_bare, y, n, times, slopes)) / (times * n)
+    return (seconds[1] - seconds[0]) / (entries[1] - entries[0]), bare
+
+
 def _note(steps: list[int], _: int, end: Outcome) -> None:
     steps.append(end.steps)
 
@@ -53,6 +107,10 @@ def main() -> None:
             f"{network.n_nodes:<8} {network.n_links:<8} {entries:<9} {1e3 * each:<12.4g} "
             f"{1e9 * each / (entries * LANES):.3g}"
         )
+    print("nodes    ns per entry   ns per row, bare   ratio")
+    for n in WORLDS:
+        entry, row = entry_and_row(n)
+        print(f"{n:<8} {1e9 * entry:<14.3g} {1e9 * row:<18.3g} {entry / row:.2f}")
 
 
 if __name__ == "__main__":

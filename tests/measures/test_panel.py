@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from chimera_hpc import measures
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.job import registry
+from chimera_hpc.job import Sweep, registry
 from chimera_hpc.job.tables import Features, Measures
 from chimera_hpc.measures.fourier import measure_signals
 from chimera_hpc.measures.measure import MeasuredRun
+from chimera_hpc.run.block import run_block
+from chimera_hpc.store.schema import scalar_labels
 
 DATA = Path(__file__).parent.parent / "data"
 Array = NDArray[np.float64]
@@ -314,3 +316,44 @@ def test_names_from_the_literature_stand_for_measures() -> None:
     given = Measures(panel=["triplet", "SI", "sigma_l", "order", "fit"])
     assert given.panel == ("variations", "range", "local_sigma", "sigma", "order", "fit")
     assert Measures(panel=["order", "g0h0"]).panel == ("variations", "order", "g0h0")
+
+
+THREE = {
+    "V_theta": (0.040, 0.273, 0.559),
+    "V_a": (0.0077, 0.108, 0.0157),
+    "V_Omega": (0.0016, 0.112, 0.011),
+    "sigma_1": (0.283, 1.31, 2.01),
+    "R": (0.411, 0.046, 0.015),
+    "R_local": (0.990, 0.755, 0.536),
+    "R_local_min": (0.987, 0.393, 0.420),
+    "chi": (0.0055, 0.087, 0.0147),
+    "lambda": (0.0054, 0.019, 0.019),
+    "g0": (0.304, 0.247, 0.018),
+    "g0_global": (0.326, 0.174, 0.156),
+    "h0": (0.185, 0.146, 0.029),
+    "omega": (7.43, 16.2, 28.8),
+    "omega_std": (0.0129, 3.66, 0.108),
+    "plateau": (1.0, 0.44, 0.8),
+    "centre_of_mass": (0.930, 0.049, 0.028),
+    "acm": (0.988, 0.324, 0.070),
+    "acm_delays": (50, 22, 19),
+    "r_squared": (0.518, 0.840, 0.919),
+    "badly_fitted": (0.32, 0.0, 0.0),
+}
+"""The first seed at P = Q = 9, 12, 21; docs/measures.md has the medians of twenty."""
+
+
+def test_measures_of_the_papers_ordered_chimera_and_disordered_states() -> None:
+    panel = ["triplet", "SI", "sigma_l", *PANEL]
+    grid = {"P": [9, 12, 21], "Q": "P", "seeds": 1}
+    job = {"name": "three", "model": "topological_fhn", "grid": grid, "measures": {"panel": panel}}
+    sweep = Sweep.from_dict(job)
+    made = run_block(sweep, sweep.points()).scalars
+    found = dict(zip(scalar_labels(sweep), made.T.tolist(), strict=True))
+    for name, expected in THREE.items():
+        # The states are chaotic: another processor may round otherwise.
+        assert found[name] == pytest.approx(expected, rel=0.3, abs=0.02), name
+    local = np.array([found[f"local_sigma_{m}"] for m in range(1, 7)])
+    strength = np.mean(local > 0.1256 * np.array(found["range_u"]), axis=0)
+    assert [strength[0], strength[2]] == [0.0, 1.0]
+    assert 0.0 < strength[1] < 1.0
