@@ -17,6 +17,7 @@ from chimera_hpc.classify.classification import classify
 from chimera_hpc.classify.classifiers import Classifier
 from chimera_hpc.classify.naming import TRIPLET
 from chimera_hpc.classify.tree import Linkage
+from chimera_hpc.measures.checks import floats
 
 
 class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-ignore]
@@ -71,6 +72,9 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
         points = self._checked(X, reset=True)
         if self.names == TRIPLET and points.shape[1] != 3:
             raise BadInput(f'names = "triplet" is for V_theta, V_a, V_Omega, not {points.shape[1]}')
+        least = floats("least", self.least)
+        if least.shape not in ((), (points.shape[1],)) or not (least >= 0.0).all():
+            raise BadInput(f"least = {self.least}: one number >= 0, or one for each column")
         known = np.asarray(np.isfinite(points).all(axis=1))
         made = classify(
             np.where(known[:, None], points, np.nan),
@@ -79,7 +83,7 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
             classifier=self.classifier,
             cuts=(self.n,),
             names=self.names,
-            least=self.least,
+            least=least,
         )
         cut = made.cuts[self.n]
         self.labels_, self.names_, self.atlas_ = cut.labels, cut.names, Atlas.of(made, cut)

@@ -51,7 +51,15 @@ class RunTransformer(Stateless):
         raise NotImplementedError
 
 
-class FourierFeatures(RunTransformer):
+class ProfileTransformer(RunTransformer):
+    """A transformer to profiles (runs, 3, nodes)."""
+
+    def set_output(self, *, transform: str | None = None) -> Self:
+        """Change nothing: profiles stay arrays, as no data frame holds three dimensions."""
+        return self
+
+
+class FourierFeatures(ProfileTransformer):
     """Phase, amplitude and frequency of every node by the Fourier line in windows.
 
     As `chimera_hpc.fourier_features`, by which a sweep is measured. The result is an array (runs,
@@ -120,7 +128,7 @@ refine, time_origin, steady, steady_threshold
         return np.stack([found.phase, found.heights, found.frequency])
 
 
-class HilbertFeatures(RunTransformer):
+class HilbertFeatures(ProfileTransformer):
     """Phase, amplitude and frequency of every node by its analytic signal.
 
     As `chimera_hpc.measures.hilbert_features`; the result is that of `FourierFeatures`.
@@ -135,7 +143,7 @@ class HilbertFeatures(RunTransformer):
         return np.stack(hilbert_features(run.t, run.u, reference_node=self.reference_node))
 
 
-class WaveletFeatures(RunTransformer):
+class WaveletFeatures(ProfileTransformer):
     """Phase, amplitude and frequency of every node along the ridge of a Morlet transform.
 
     As `chimera_hpc.measures.wavelet_features`; the result is that of `FourierFeatures`.

@@ -45,6 +45,8 @@ class TotalVariation(Stateless):
     def transform(self, X: Any) -> NDArray[np.float64]:
         """Return the triplets of runs, (runs, 3)."""
         where = _pairs(self.pairs)
+        if not hasattr(X, "__len__") or hasattr(X, "tocsr"):
+            raise BadInput(f"profiles are a list or an array, not {type(X).__name__}")
         found = [total_variation_arrays(*_checked(row), **where) for row in X]
         return np.array(found, dtype=np.float64).reshape(-1, 3)
 
@@ -111,11 +113,15 @@ class Panel(RunTransformer):
             features=measure_signals(run.t, u, **settings.options()),
             settings=settings,
             distance=float("nan"),
-            pairs=None if self.pairs is None else np.asarray(self.pairs, dtype=np.int64),
+            pairs=None if self.pairs is None else np.asarray(self.pairs),
         )
         return [float(x) for one in self._measures() for x in one.compute(measured)]
 
     def _measures(self) -> list[Any]:
+        if isinstance(self.names, str) or not len(self.names):
+            raise BadInput(f'names is {self.names!r}; a list of measures is needed, as ["order"]')
+        if "distance" in self.names:
+            raise BadInput('names: "distance" needs the ball of initial states of a job')
         for name in self.names:
             check_name("names", "a measure", name, {**MEASURES, **OTHER_NAMES})
         return measures([n for name in self.names for n in OTHER_NAMES.get(name, (name,))])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from sklearn.base import clone
 from sklearn.cluster import AgglomerativeClustering
 from sklearn.pipeline import make_pipeline
@@ -149,6 +150,21 @@ def test_panel_gives_the_numbers_of_the_measures() -> None:
     assert found[0, names.index("r_squared")] == pytest.approx(fit)
 
 
+def test_small_ranges_are_not_stretched() -> None:
+    rng = np.random.default_rng(0)
+    points = np.stack([np.repeat([0.1, 0.5], 10), *(0.01 * rng.random((2, 20)))], axis=1)
+    points[:, 0] += 0.1 * rng.random(20)
+    stretched, left = ChimeraClasses(2).fit(points), ChimeraClasses(2, least=0.2).fit(points)
+    assert np.ptp(stretched.scaler_, axis=0).max() < 0.5
+    np.testing.assert_allclose(np.ptp(left.scaler_, axis=0)[1:], 0.2)
+    assert rand_index(left.labels_, np.repeat([0, 1], 10)) == 1.0
+
+
+def test_a_line_gives_data_frames() -> None:
+    line = make_pipeline(FourierFeatures(), TotalVariation()).set_output(transform="pandas")
+    assert line.fit_transform(RUNS[:2]).columns.tolist() == ["V_theta", "V_a", "V_Omega"]
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -161,7 +177,14 @@ def test_panel_gives_the_numbers_of_the_measures() -> None:
         (lambda: TotalVariation("row").transform([]), "pairs is 'row'; allowed"),
         (lambda: TotalVariation().transform([[1.0, 2.0]]), r"\(3, nodes\), not \(2,\)"),
         (lambda: Panel(["ordr"]).transform(RUNS), "'ordr' is not a measure; did you mean"),
+        (lambda: TotalVariation().transform(csr_array(np.eye(3))), "not csr_array"),
+        (lambda: Panel("order").transform(RUNS), "names is 'order'; a list of measures is needed"),
+        (lambda: Panel([]).transform(RUNS), "a list of measures is needed"),
+        (lambda: Panel(["distance"]).transform(RUNS), "needs the ball of initial states"),
+        (lambda: Panel(["order"], pairs=[[0, 1.5]]).transform(RUNS), "pairs must be .ring. or"),
         (lambda: ChimeraClasses(names="triplet").fit([[0.0], [1.0]]), "is for V_theta"),
+        (lambda: ChimeraClasses(least=[1.0, 2.0]).fit(np.eye(3)), "one for each column"),
+        (lambda: ChimeraClasses(least=np.nan).fit(np.eye(3)), "one number >= 0"),
     ],
 )
 def test_bad_input_is_one_clear_line(call: Any, message: str) -> None:
