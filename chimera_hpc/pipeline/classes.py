@@ -74,7 +74,7 @@ class ChimeraClasses(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-
             raise BadInput(f'names = "triplet" is for V_theta, V_a, V_Omega, not {points.shape[1]}')
         least = floats("least", self.least)
         if least.shape not in ((), (points.shape[1],)) or not (least >= 0.0).all():
-            raise BadInput(f"least = {self.least}: one number >= 0, or one for each column")
+            raise BadInput(f"least = {self.least!r}: one number >= 0, or one for each column")
         known = np.asarray(np.isfinite(points).all(axis=1))
         made = classify(
             np.where(known[:, None], points, np.nan),

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import temporary_name
 from chimera_hpc.base.status import Status
 from chimera_hpc.reduction.netcdf3 import Layout, resized
