@@ -115,6 +115,13 @@ def checked_order(order: ArrayLike, n_nodes: int) -> Integers:
     return found
 
 
+def check_indices(what: str, indices: ArrayLike, count: int) -> None:
+    """Raise BadInput unless all indices are in 0 .. count - 1."""
+    wrong = np.setdiff1d(indices, np.arange(count))
+    if len(wrong):
+        raise BadInput(f"{what} {wrong[0]}: allowed is 0 to {count - 1}")
+
+
 def pair_keys(n_nodes: int, pairs: Integers) -> Integers:
     """Return one number per pair of nodes that does not depend on which comes first, shape (n,)."""
     keys: Integers = pairs.min(axis=1) * n_nodes + pairs.max(axis=1)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.network import checks, hodge
-from chimera_hpc.network.checks import Array, Integers
+from chimera_hpc.network.checks import Array, Integers, check_indices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -172,14 +172,9 @@ class SimplicialComplex:
         )
 
     def reorient(self, links: Integers) -> Self:
-        """Reverse the links with the given indices.
-
-        Raises BadInput: a directed network, or an index that is no link's.
-        """
+        """Reverse the links with the given indices."""
         self._refuse_directed("reorientation")
-        wrong = np.setdiff1d(links, np.arange(self.n_links))
-        if len(wrong):
-            raise BadInput(f"link {wrong[0]}: allowed is 0 to {self.n_links - 1}")
+        check_indices("link", links, self.n_links)
         turned = self.links.copy()
         turned[links] = turned[links, ::-1]
         return self._with(links=turned)
