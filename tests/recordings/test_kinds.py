@@ -270,6 +270,8 @@ def test_signals_out_of_range_and_endless_filters_are_refused():
             prepare(Recording(T, factor * U), None)
     with pytest.raises(BadInput, match="--lowpass: 1e-09 per unit of time is too low"):
         prepare(Recording(T, U), None, lowpass=1e-9)
+    with pytest.raises(BadInput, match="--lowpass: 12 samples are too few, 16 are needed"):
+        prepare(Recording(T[:12], U[:12]), None, lowpass=5.0)
 
 
 def test_structure_of_matlab_is_looked_into(tmp_path: Path):
