@@ -88,7 +88,7 @@ def _part(part: str, sizes: Sizes, folder: Path, results: Results, tiny: bool) -
         rows = sweeps.workers(folder, settings, seeds, pieces, repeats, results.scaling)
         return rows + sweeps.memory(folder, (55.0, 60.0) if tiny else (1000.0, 10_000.0))
     if part == "starting":
-        return sweeps.starting(folder, 1 if tiny else 3)
+        return sweeps.starting(folder, 1 if tiny else 3, cold=not tiny)
     if part == "reduction":
         return _reduction(folder, results, tiny)
     return _projection(folder, results, tiny)
