@@ -1,6 +1,6 @@
-"""The bookkeeping of large sweeps, measured with points that cost nothing.
+"""What large sweeps cost: bookkeeping, with points that cost nothing, and large points.
 
-``scripts/scale`` prints the table; it takes some minutes and about 4 GB of disk.
+``scripts/scale`` prints the table; it takes less than 20 minutes and about 4 GB of disk.
 """
 
 from __future__ import annotations
@@ -15,11 +15,16 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import psutil
+
+sys.path.insert(0, str(Path(__file__).parent))
+import large
+from measured import MB, Done, Line, peak_memory, run, table
+
+__all__ = ["Done", "Line", "peak_memory", "run", "table"]
 
 if TYPE_CHECKING:
     from chimera_hpc.store.store import Store
@@ -39,26 +44,6 @@ series = "none"
 block = 300
 """
 SMALL, LARGE = 100_000, 1_000_000
-MB = 1e6
-
-
-@dataclass(frozen=True)
-class Line:
-    """One line of the table."""
-
-    what: str
-    measured: float
-    unit: str
-    limit: float
-    at_least: bool = False
-
-    @property
-    def good(self) -> bool:
-        return self.measured >= self.limit if self.at_least else self.measured <= self.limit
-
-    def words(self) -> list[str]:
-        sign = ">=" if self.at_least else "<="
-        return [self.what, f"{self.measured:.3g} {self.unit}", f"{sign} {self.limit:g} {self.unit}"]
 
 
 def main() -> int:
@@ -66,11 +51,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="scripts/scale", description=__doc__.splitlines()[0])
     parser.add_argument("--folder", type=Path, help="where to work (default: a temporary folder)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the table here too")
+    parser.add_argument("--only", choices=("bookkeeping", "large"), help="one half of the table")
+    parser.add_argument("--tiny", action="store_true", help="smallest large points: only to try it")
     parser.add_argument("--points", type=int, default=LARGE, help="points of the large sweep")
     args = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="chimera-scale-", dir=args.folder))
     try:
-        lines = measure(folder, args.points)
+        lines = [] if args.only == "large" else measure(folder, args.points)
+        lines += [] if args.only == "bookkeeping" else measure_large(folder, args.tiny)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     print(table(lines))
@@ -81,82 +69,50 @@ def main() -> int:
 
 def measure(folder: Path, n_points: int) -> list[Line]:
     """Return all lines of the table."""
-    small, large = plan(folder, "small", SMALL), plan(folder, "large", n_points)
+    small, big = plan(folder, "small", SMALL), plan(folder, "large", n_points)
     lines = [
-        Line(f"plan of {n_points:.0e} points: time", large.seconds, "s", 15),
-        Line(f"plan of {n_points:.0e} points: memory", large.memory / MB, "MB", 1000),
+        Line(f"plan of {n_points:.0e} points: time", big.seconds, "s", 15),
+        Line(f"plan of {n_points:.0e} points: memory", big.memory / MB, "MB", 1000),
     ]
     lines.append(
         Line("blocks of 300 points, one writer", serial_rate(folder), "a second", 50, True)
     )
-    memory = [scheduler_memory(folder, store.path) for store in (small, large)]
+    memory = [scheduler_memory(folder, store.path) for store in (small, big)]
     growth = (memory[1] - memory[0]) / MB
     what = f"growth of the scheduler's memory, {SMALL:.0e} to {n_points:.0e} points"
     lines.append(Line(what, growth, "MB", 50))
-    n_files = sum(len(files) for _, _, files in os.walk(large.path))
+    n_files = sum(len(files) for _, _, files in os.walk(big.path))
     blocks = -(-n_points // 300)
     lines.append(Line(f"files of {blocks} blocks", n_files, "files", 5 * blocks + 200))
-    done = run("-m", "chimera_hpc.sweep", "status", large.path.parent, "--json")
+    done = run("-m", "chimera_hpc.sweep", "status", big.path.parent, "--json")
     state = json.loads(done.text)
     assert state["done"] == n_points, state
     lines.append(Line(f"status of {n_points:.0e} points: time", done.seconds, "s", 1))
     lines.append(Line(f"status of {n_points:.0e} points: memory", done.memory / MB, "MB", 1000))
-    lines.append(export_memory(folder))
+    lines += sweep_of_series(folder)
     lines.append(tree_time(100_000))
     return lines
 
 
-def table(lines: list[Line]) -> str:
-    """Return the table as Markdown."""
-    rows = [["measured", "value", "limit"], ["---"] * 3, *(line.words() for line in lines)]
-    widths = [max(len(row[k]) for row in rows) for k in range(3)]
-    return "\n".join(
-        "| " + " | ".join(w.ljust(n) for w, n in zip(row, widths, strict=True)) + " |"
-        for row in rows
-    )
+def sweep_of_series(folder: Path, n_seeds: int = 54) -> list[Line]:
+    """Return the memory of an export and of a selection of a sweep with much series."""
+    exported = export_memory(folder, n_seeds)
+    store = series_store(folder / "lazy", n_seeds)
+    selected = large.lazily(store)
+    shutil.rmtree(store.path)
+    return [exported, selected]
 
 
-@dataclass(frozen=True)
-class Done:
-    """A command that has ended."""
-
-    seconds: float
-    memory: int
-    """Most bytes that it occupied."""
-    text: str
-    path: Path = Path()
-
-
-def peak_memory(pid: int) -> int:
-    """Return the most bytes that a process has occupied since it began its program.
-
-    `resource.getrusage` would count the memory of the process that started it, too.
-    """
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except OSError:
-        return 0
-    found = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
-    return 1024 * found[0] if found else 0
-
-
-def run(*arguments: object) -> Done:
-    """Run Python with these arguments, and measure it."""
-    began = time.perf_counter()
-    process = subprocess.Popen(
-        [sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, text=True
-    )
-    memory = 0
-    while process.poll() is None:
-        memory = max(memory, peak_memory(process.pid))
-        time.sleep(0.01)
-    seconds = time.perf_counter() - began
-    assert process.stdout is not None
-    with process.stdout as output:
-        text = output.read()
-    if process.returncode:
-        raise SystemExit(f"{arguments} ended with {process.returncode}: {text}")
-    return Done(seconds, memory, text)
+def measure_large(folder: Path, tiny: bool = False) -> list[Line]:
+    """Return the lines about large points and very many of them."""
+    return [
+        *large.rings(folder, 2_000 if tiny else 100_000, 2 if tiny else 6),
+        large.long_window(folder, 80.0 if tiny else 5_050.0),
+        *large.projections(folder, 1_000 if tiny else 100_000),
+        *large.many_points(folder, 40_000 if tiny else 10_000_000),
+        *large.estimates(folder, ("P=12",) if tiny else ("P=10:15",)),
+        large.fair_share(),
+    ]
 
 
 def plan(folder: Path, name: str, n_points: int) -> Done:
