@@ -21,8 +21,8 @@ MOST_SIDE_BY_SIDE = 96_000_000
 """Bytes per sample of eight trajectories, and the most for which they are integrated side by side
 (``SAMPLE_BYTES`` of `integrate.lanes`, which takes a second to load)."""
 _PROCESS_BYTES, _POINT_BYTES, _MEASURED_BYTES = 190_000_000, 110, 37
-"""Measured: a worker with its kernels; per point that it holds; per sample of a node, for u and w of
-one trajectory and their copies node by node."""
+"""Measured: a worker with its kernels; per point that it holds; per sample of a node, for u and w
+of one trajectory and their copies node by node."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,9 @@ def estimate(sweep: Sweep) -> Estimate:
 def worker_bytes(sweep: Sweep, n_points: int, block: int) -> int:
     """Estimate the memory of a worker, in bytes.
 
-    These are its packages and kernels, the parameters of a block's points (of all points if they are
-    not a product of axes), the series of a block that are kept, the samples of trajectories side by side, and the buffers in which one is measured.
+    These are its packages and kernels, the parameters of a block's points (of all points if they
+    are not a product of axes), the series of a block that are kept, the samples of trajectories
+    side by side, and the buffers in which one is measured.
     """
     samples = sweep.n_nodes * sweep.n_samples
     side_by_side = LANES_PER_SAMPLE * samples
