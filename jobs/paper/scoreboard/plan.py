@@ -33,7 +33,7 @@ JOBS = (
     "excitability-12",
     "plane-10",
 )
-"""A job comes after those whose atlas it asks for; its place seeds its audit, so new ones come last."""
+"""A job comes after those whose atlas it asks for. New ones come last: a place seeds an audit."""
 
 _FIRST = ("diagonal", "orientation2", "plane", "basin-200", "basin")
 """Jobs to run first: those that others ask for, then the longest; short ones fill the gaps."""
