@@ -29,11 +29,22 @@ import json
 from collections.abc import Mapping
 from hashlib import blake2b
 from operator import index
+from typing import Any
 
 import numpy as np
 
+from chimera_hpc.base.errors import BadInput
+
 STREAM_TAG = 1
 """Version of the key. It is part of every key: a new rule needs a new tag."""
+
+
+def generator(seed: Any) -> np.random.Generator:
+    """Return NumPy's generator of a seed, or the one given. Raises BadInput for no such seed."""
+    try:
+        return np.random.default_rng(seed)
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"seed = {seed!r}: a whole number from 0, or a Generator") from error
 
 
 def stream_key(

@@ -26,6 +26,7 @@ do, which begin at a maximum of that node.
 
 from __future__ import annotations
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +36,12 @@ from scipy.signal import hilbert
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.measures.checks import Array
-from chimera_hpc.measures.signals_input import check_node, checked_signals
+from chimera_hpc.measures.signals_input import (
+    CheckedSignals,
+    check_node,
+    checked_signals,
+    suspect_signals,
+)
 
 ENDS = 0.05
 """Share of the recording at each end that is left out: transforms are inexact there."""
@@ -46,6 +52,8 @@ _FEWEST_PERIODS = 5.0
 """Periods in the recording of the lowest frequency of the wavelets."""
 _FEWEST_SAMPLES = 4.0
 """Samples per period of the highest."""
+_LEAST = 0.25
+"""Least amplitude of a ridge that follows its signal, in units of the signal's."""
 
 Complex = NDArray[np.complex128]
 
@@ -73,8 +81,13 @@ def hilbert_features(t: ArrayLike, u: ArrayLike, *, reference_node: int = 0) -> 
     ------
     BadInput
         As `fourier_features`.
+
+    Warns
+    -----
+    UserWarning
+        As `fourier_features`, for constant, rising or swapped signals.
     """
-    given = checked_signals(t, u)
+    given = _looked_at("hilbert_features", t, u)
     made: Complex = hilbert(given.x - given.x.mean(axis=1, keepdims=True), axis=1)
     return _averages(made, given.dt, check_node(reference_node, len(made)))
 
@@ -104,8 +117,13 @@ def wavelet_features(
     ------
     BadInput
         As `fourier_features`, or an empty range of frequencies.
+
+    Warns
+    -----
+    UserWarning
+        As `hilbert_features`, or a signal below the lowest frequency.
     """
-    given = checked_signals(t, u)
+    given = _looked_at("wavelet_features", t, u)
     x, step = given.x - given.x.mean(axis=1, keepdims=True), given.dt
     lowest = _FEWEST_PERIODS / (step * x.shape[1]) if low is None else low
     highest = 1.0 / (_FEWEST_SAMPLES * step) if high is None else high
@@ -114,7 +132,29 @@ def wavelet_features(
             f"wavelet frequencies from {lowest:.3g} to {highest:.3g}: they must rise, from above "
             f"0 to at most {0.5 / step:.3g}, half the sampling frequency"
         )
-    return _averages(_ridge(x, step, lowest, highest), step, check_node(reference_node, len(x)))
+    ridge = _ridge(x, step, lowest, highest)
+    found = _averages(ridge, step, check_node(reference_node, len(x)))
+    missed = found.amplitude < _LEAST * np.sqrt(2.0) * x.std(axis=1)
+    slow = missed | ((found.frequency < lowest) & (found.amplitude > 0.0))
+    if slow.any():
+        warnings.warn(
+            f"wavelet_features: node {int(np.argmax(slow))} (column of u) is slower than "
+            f"the lowest frequency, {lowest:.3g}; take a longer recording, or give low",
+            UserWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def _looked_at(name: str, t: ArrayLike, u: ArrayLike) -> CheckedSignals:
+    """Return checked signals, and warn of those that are hardly meant, as `fourier_features`."""
+    given = checked_signals(t, u)
+    finite = np.isfinite(given.x).all(axis=1)
+    if not finite.all():
+        raise BadInput(f"u must be finite: node {int(np.argmin(finite))} (column of u) is not")
+    for line in suspect_signals(given.x):
+        warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
+    return given
 
 
 def _ridge(x: Array, step: float, lowest: float, highest: float) -> Complex:

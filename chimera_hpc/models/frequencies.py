@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.base.streams import network_stream
+from chimera_hpc.base.streams import generator, network_stream
 from chimera_hpc.models.parameters import Parameter
 from chimera_hpc.models.protocol import Row
 
@@ -49,7 +49,7 @@ def natural_frequencies(
             f"frequencies: centre = {centre}, width = {width}: finite numbers and width >= 0 "
             "are needed"
         )
-    random = np.random.default_rng(seed)
+    random = generator(seed)
     if kind == "identical":
         return np.full(size, float(centre))
     drawn = random.standard_normal if kind == "normal" else random.standard_cauchy

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.streams import generator
 from chimera_hpc.network import checks, hodge
 from chimera_hpc.network.checks import Array, Integers, check_indices
 
@@ -195,10 +196,10 @@ class SimplicialComplex:
             Unless 0 <= count <= N1, or <= the number of ``among`` if given.
         """
         n_links = self.n_links if among is None else len(among)
-        if not 0 <= count <= n_links:
+        if not 0 <= count <= n_links or count != int(count):
             where = f"of the {self.kind}" if among is None else "to draw from"
             raise BadInput(f"flips = {count}: allowed is 0 to the {n_links} links {where}")
-        drawn = np.random.default_rng(seed).choice(n_links, count, replace=False)
+        drawn = generator(seed).choice(n_links, int(count), replace=False)
         return self.reorient(drawn if among is None else among[drawn])
 
     # -- matrices --------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.streams import generator
 from chimera_hpc.network.checks import Integers
 from chimera_hpc.network.hodge import ring_links
 
@@ -49,7 +50,7 @@ def small_world(n: int, P: int, rewire: float, seed: Seed) -> Parts:
         raise BadInput(f"P = {P} on a ring of {n} nodes: 1 <= P and 2 P < n are needed")
     _share("rewire", rewire)
     _few(n * float(P))
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     links = ring_links(n, P)
     chosen = np.flatnonzero(rng.random(len(links)) < rewire)
     # Nearest neighbours first, as Watts and Strogatz go around the ring.
@@ -163,7 +164,7 @@ def _parts(graph: Any) -> Parts:
 
 def _python_random(seed: Seed) -> Random:
     """Return Python's generator, whose numbers are the same in every version, for networkx."""
-    return Random(int(np.random.default_rng(seed).integers(2**63)))
+    return Random(int(generator(seed).integers(2**63)))
 
 
 def _share(name: str, value: float) -> None:

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.network.network import Network
 from chimera_hpc.network.topology import Topology
 
 # The paper's drawings of N0 = 8, P = 3 (nodes counted from 1, as there): every link as it is drawn.
@@ -201,6 +202,10 @@ def test_reorienting_leaves_the_ring_it_started_from_alone(topology):
         (lambda: Topology.ring(8, 3).reorient_node(-1, 1), "node = -1: allowed is 0 to 7"),
         (lambda: Topology.ring(8, 3).reorient_random(25), "flips = 25: allowed is 0 to the 24"),
         (lambda: Topology.ring(8, 3).reorient_random(-1), "flips = -1: allowed is 0 to the 24"),
+        (lambda: Topology.ring(8, 3).reorient_random(2.5), "flips = 2.5: allowed is 0 to the 24"),
+        (lambda: Topology.ring(8, 3).reorient_random(2, -1), "seed = -1: a whole number from 0"),
+        (lambda: Network.small_world(9, 2, 0.1, seed=0.5), "seed = 0.5: a whole number from 0"),
+        (lambda: Network.scale_free(9, 2, seed=-3), "seed = -3: a whole number from 0"),
         (
             lambda: Topology.ring(8, 3).reorient_random(7, 0, Topology.ring(8, 3).links_at(0)),
             "flips = 7: allowed is 0 to the 6 links to draw from",
