@@ -105,7 +105,8 @@ def reductions(store: Store) -> Iterator[tuple[str, StoredReduction]]:
         )
         with suppress(BadInput):
             found = read_reduction(store.path.parent / name if name else store.path)
-            if found.arrays["cell"].shape == (store.n_points,):
+            columns = [x for key, x in found.arrays.items() if key == "cell" or "labels_" in key]
+            if all(len(column) == store.n_points for column in columns):
                 yield suffix, found
 
 

@@ -166,7 +166,8 @@ def check(made: Written, folder: Path) -> None:
     bad = made.fault in ("dead", "noisy", "rising")
     good = np.array([not (bad and name == _position(ready.names, made)) for name in ready.names])
     features = found.features
-    assert features.frequency[good] == pytest.approx(made.frequency, rel=0.01), said
+    # Windows of seven periods of a pure sine place its line up to 1.4 % off.
+    assert features.frequency[good] == pytest.approx(made.frequency, rel=0.02), said
     assert features.amplitude[good] == pytest.approx(made.amplitude, rel=0.02), said
 
 
