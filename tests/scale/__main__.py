@@ -90,7 +90,7 @@ def measure(folder: Path, n_points: int) -> list[Line]:
     lines.append(Line(f"status of {n_points:.0e} points: time", done.seconds, "s", 1))
     lines.append(Line(f"status of {n_points:.0e} points: memory", done.memory / MB, "MB", 1000))
     lines += sweep_of_series(folder)
-    lines.append(tree_time(100_000))
+    lines += [tree_time(100_000), sampled_tree(50_000)]
     return lines
 
 
@@ -160,6 +160,25 @@ def tree_time(n_runs: int) -> Line:
     program += "n = int(sys.argv[1]); draw = numpy.random.default_rng(0); "
     program += "made = classify(draw.random((n, 3)), numpy.ones(n)); assert not made.sampled"
     return Line(f"tree of {n_runs:.0e} runs: time", run("-c", program, n_runs).seconds, "s", 200)
+
+
+def sampled_tree(n_runs: int) -> Line:
+    """Return the share of runs whose class by a tree of half of them is that by the tree of all.
+
+    Three groups that overlap, of different sizes; each class of the half counts as the class of
+    all with which it shares most.
+    """
+    program = "import sys, numpy; from chimera_hpc.classify.classification import classify; "
+    program += "n = int(sys.argv[1]); draw = numpy.random.default_rng(0); k = draw.choice(3, n, "
+    program += "p=[.5, .3, .2]); x = .3 * k[:, None] + draw.normal(0, .07, (n, 3)); "
+    program += "one = numpy.ones(n); made = classify(x, one, largest_tree=n // 2); "
+    program += "full = classify(x, one); assert made.sampled and not full.sampled; "
+    program += "shared = numpy.zeros((4, 4)); "
+    program += "numpy.add.at(shared, (made.base.labels, full.base.labels), 1); "
+    program += "print(shared.max(1).sum() / n)"
+    share = float(run("-c", program, n_runs).text)
+    what = f"same classes by a tree of half of {n_runs:.0e} runs"
+    return Line(what, share, "", 0.95, True)
 
 
 def series_store(folder: Path, n_seeds: int) -> Store:

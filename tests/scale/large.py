@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,11 +59,13 @@ def rings(folder: Path, nodes: int, points: int) -> list[Line]:
     out = folder / "rings"
     planned = estimate(Sweep.load(job)).worker_bytes
     done = run(*SWEEP, "run", job, "--out", out, "--cluster", "serial", "--no-figures", good=(0, 1))
+    first = first_estimate((out / "run.log").read_text().splitlines())
     samples = nodes * 1001
     what = f"{points} points of {nodes} nodes"
     lines = [
         Line(f"run of {what}: memory over that of plan", done.memory / planned, "", 1.3),
         Line("a worker's bytes per sample and node", (done.memory - 2e8) / samples, "bytes", 45),
+        Line("first ETA of this run over the seconds that it took", first, "", 2, before="7"),
     ]
     reduced = run(*SWEEP, "reduce", out, good=(0, 1))
     lines += [
@@ -73,7 +76,30 @@ def rings(folder: Path, nodes: int, points: int) -> list[Line]:
     for name, words in (("x.nc", ("--series",)), ("x.csv", ())):
         done = run(*SWEEP, "export", out, *words, "--to", folder / name)
         lines.append(_memory(f"export of them to .{name[2:]}", done, 500, "7800 MB"))
-    return [*lines, *_parts(out)]
+    return [*lines, *_parts(out), _whole(out)]
+
+
+def first_estimate(log: list[str]) -> float:
+    """Return the first ETA of a run over the time that passed from it to the last line with one."""
+    lines = [line for line in log if ", ETA " in line]
+    first, last = (datetime.fromisoformat(line.split()[0]) for line in (lines[0], lines[-1]))
+    hours, minutes, seconds = map(int, lines[0].rsplit(" ", 1)[1].split(":"))
+    estimate = 3600 * hours + 60 * minutes + seconds
+    return estimate / max((last - first).total_seconds(), 1.0)
+
+
+def _whole(out: Path) -> Line:
+    """Return the time of decoding a whole large point, over that of the same data in one chunk."""
+    import zarr
+
+    stored: Any = zarr.open_array(out / "store.zarr", path="u", mode="r")
+    kept = stored[:1]
+    one: Any = zarr.create_array(
+        out / "one-chunk.zarr", data=kept, chunks=kept.shape, compressors=stored.compressors
+    )
+    seconds = [seconds_here(lambda a=array: a[:1]) for array in (stored, one)]
+    what = "processor time to decode a large point over that of one chunk"
+    return Line(what, seconds[0] / seconds[1], "", 1)
 
 
 def _parts(out: Path) -> list[Line]:
@@ -177,6 +203,16 @@ def estimates(folder: Path, settings: tuple[str, ...] = ("P=10:15",)) -> list[Li
         Line("estimate of plan over the seconds of a run", planned / spent, "", 2),
         Line("the same of status", state["core_seconds_left"] / spent, "", 2),
     ]
+
+
+def seconds_here(work: Callable[[], object]) -> float:
+    """Return the seconds of processor that a call takes in this process: the least of three."""
+    taken = []
+    for _ in range(3):
+        began = time.process_time()
+        work()
+        taken.append(time.process_time() - began)
+    return min(taken)
 
 
 def seconds_of(work: Callable[[], object]) -> float:

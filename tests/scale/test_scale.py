@@ -89,6 +89,17 @@ def test_export_of_series_takes_less_memory_than_the_series(
     assert line.good, line.words()
 
 
+def test_first_estimate_is_compared_with_the_time_that_was_left(scale: ModuleType) -> None:
+    log = [
+        "2026-01-01T00:00:00+00:00 run 1: 3 of 3 blocks to do",
+        "2026-01-01T00:00:10+00:00 1 of 3 points, 0.1 points/s, elapsed 00:00:10, ETA 00:01:30",
+        "2026-01-01T00:00:30+00:00 2 of 3 points, 0.1 points/s, elapsed 00:00:30, ETA 00:00:10",
+        "2026-01-01T00:00:40+00:00 3 of 3 points, 0.1 points/s, elapsed 00:00:40, ETA 00:00:00",
+    ]
+    estimate: Callable[..., float] = scale.large.first_estimate
+    assert estimate(log) == 3.0
+
+
 def count_files(folder: Path) -> int:
     return sum(len(files) for _, _, files in os.walk(folder))
 

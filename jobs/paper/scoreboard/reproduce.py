@@ -18,12 +18,13 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.job.shipped import jobs_folder
 from chimera_hpc.reduction.atlases import load_atlas
+from chimera_hpc.run.compiled import compile_once
 from scoreboard.audit_text import audit_tables, audit_text
 from scoreboard.causes import read_causes
 from scoreboard.chance import DRAWS, add_causes
 from scoreboard.claims import DEFAULT, finding, markdown, read_claims, scoreboard, summary
 from scoreboard.evidence import Evidence
-from scoreboard.plan import JOBS, PRINTED, TRIPLETS, needs, running_order, settings
+from scoreboard.plan import JOBS, PRINTED, TRIPLETS, load, needs, running_order, settings
 
 _HEAD = """\
 # Claims of the paper
@@ -166,6 +167,10 @@ def run_jobs(
     """
     at_once = max(1, workers if quick else min(2, workers))
     each = max(1, workers // at_once)
+    for name in running_order(names)[:1]:
+        # Two jobs that begin at the same time would both compile what they share.
+        sweep = load(name, jobs_folder() / "paper", quick)
+        compile_once(sweep, sweep.points(), load=False, say=say)
     running: dict[str, Future[tuple[int, float]]] = {}
     with ThreadPoolExecutor(at_once) as pool:
         for name in running_order(names):
