@@ -23,7 +23,7 @@ class Lanes(NamedTuple):
     k: Array
     """Stages in order, then the error estimate: ((stages + 1) * rows, lanes)."""
     weights: Array
-    """Scratch: the weights of the stages in two samples, (2 * stages, `LANES`)."""
+    """Scratch: the weights of the stages in a sample, (stages, `LANES`)."""
     lane: Array
     """Numbers of each lane, (LANE_ROWS, lanes): see `lane_rows`."""
     counters: NDArray[np.int64]

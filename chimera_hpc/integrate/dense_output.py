@@ -8,14 +8,12 @@ padded to a whole number of vectors.
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.lane_rows import (
     IS_DUE,
-    IS_DUE_AFTER,
     LOG_ERROR_NEW,
     NEXT_SAMPLE,
     RUNNING,
     STATE,
     STEP,
     THETA,
-    THETA_AFTER,
     TIME,
     TIME_NEW,
 )
@@ -43,7 +41,7 @@ def _weight(p, j, theta):
 @jit()
 def _between(h, step, weights, i):
     # Row i of the state at time t + theta h of the current step, by the continuous extension.
-    stages = weights.shape[0] // 2
+    stages = weights.shape[0]
     total = load(h, weights, 0) * load(h, step.k, step.first + i)
     for j in range(1, stages - 1):
         total = fma(load(h, weights, j), load(h, step.k, j * step.units + i), total)
@@ -85,7 +83,7 @@ def _fma_each(w, a, b):
 @jit()
 def _tile(h, step, weights, i):
     # Rows i ... i + 7 of `_between`; the weights are read once for all of them.
-    stages = weights.shape[0] // 2
+    stages = weights.shape[0]
     tile = _times(load(h, weights, 0), _eight_of(0, h, step, stages, i))
     for j in range(1, stages):
         tile = _fma_each(load(h, weights, j), _eight_of(j, h, step, stages, i), tile)
@@ -93,92 +91,68 @@ def _tile(h, step, weights, i):
 
 
 @jit()
-def _two_tiles(h, step, weights, i):
-    # The same for two samples; the stages are read once for both.
-    stages = weights.shape[0] // 2
-    rows = _eight_of(0, h, step, stages, i)
-    tile, after = _times(load(h, weights, 0), rows), _times(load(h, weights, stages), rows)
-    for j in range(1, stages):
-        rows = _eight_of(j, h, step, stages, i)
-        tile = _fma_each(load(h, weights, j), rows, tile)
-        after = _fma_each(load(h, weights, stages + j), rows, after)
-    rows = _eight(h, step.y, i)
-    return _fma_each(h, tile, rows), _fma_each(h, after, rows)
-
-
-@jit()
-def _due(lanes, limits, after, is_due, theta):
-    # Find the lanes whose accepted step covers their next sampling time, or the one ``after`` it,
-    # and where in the step.
+def _due(lanes, limits):
+    # Find the lanes whose accepted step covers their next sampling time, and where in the step.
     lane, count, due = lanes.lane, lanes.counters, 0
     for m in range(lane.shape[1]):
-        at = count[NEXT_SAMPLE, m] + after
+        at = count[NEXT_SAMPLE, m]
         t = min(limits.start + at * limits.step, limits.t_end)
-        count[is_due, m] = (
+        count[IS_DUE, m] = (
             count[STATE, m] == RUNNING
             and at < lanes.samples.shape[1]
             and lane[LOG_ERROR_NEW, m] <= 0.0
             and t <= lane[TIME_NEW, m]
         )
-        due += count[is_due, m]
+        due += count[IS_DUE, m]
         # Lanes without a due sample get the state before the step, which is not read.
-        lane[theta, m] = 0.0
-        if count[is_due, m] == 1:
-            lane[theta, m] = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
+        lane[THETA, m] = 0.0
+        if count[IS_DUE, m] == 1:
+            lane[THETA, m] = min((t - lane[TIME, m]) / lane[STEP, m], 1.0)
     return due
 
 
 @jit()
-def _weigh(like, lanes, row, p, first):
-    theta = across(like, lanes.lane, row)
+def _weigh(like, lanes, p):
+    theta = across(like, lanes.lane, THETA)
     for j in range(p.shape[0]):
-        store(lanes.weights, first + j, _weight(p, j, theta))
+        store(lanes.weights, j, _weight(p, j, theta))
 
 
 @jit()
-def _keep(samples, count, is_due, at, m, i, vector):
+def _keep(samples, count, m, i, vector):
     # Rows i ... i + 7 of lane m's sample, if one is due. This function is called often and not
     # inlined, so it takes the two arrays that it uses instead of all of `Lanes`.
-    if count[is_due, m] == 1:
+    if count[IS_DUE, m] == 1:
         total, width = samples.shape[1:]
-        stream_at(samples, (m * total + count[NEXT_SAMPLE, m] + at) * width + i, vector)
+        stream_at(samples, (m * total + count[NEXT_SAMPLE, m]) * width + i, vector)
 
 
 @jit()
-def _keep_tile(samples, count, is_due, at, i, tile):
+def _keep_tile(samples, count, i, tile):
     s0, s1, s2, s3, s4, s5, s6, s7 = transposed(tile)
-    _keep(samples, count, is_due, at, 0, i, s0)
-    _keep(samples, count, is_due, at, 1, i, s1)
-    _keep(samples, count, is_due, at, 2, i, s2)
-    _keep(samples, count, is_due, at, 3, i, s3)
-    _keep(samples, count, is_due, at, 4, i, s4)
-    _keep(samples, count, is_due, at, 5, i, s5)
-    _keep(samples, count, is_due, at, 6, i, s6)
-    _keep(samples, count, is_due, at, 7, i, s7)
+    _keep(samples, count, 0, i, s0)
+    _keep(samples, count, 1, i, s1)
+    _keep(samples, count, 2, i, s2)
+    _keep(samples, count, 3, i, s3)
+    _keep(samples, count, 4, i, s4)
+    _keep(samples, count, 5, i, s5)
+    _keep(samples, count, 6, i, s6)
+    _keep(samples, count, 7, i, s7)
 
 
 @jit()
 def sample(like, h, step, lanes, p, limits):
-    """Write the observed rows at the sampling times that the accepted steps cover.
-
-    The samples of a step are written two at a time, in all lanes together.
-    """
+    """Write the observed rows at the sampling times that the accepted steps cover."""
     count, weights, samples = lanes.counters, lanes.weights, lanes.samples
     width = samples.shape[2]
-    while _due(lanes, limits, 0, IS_DUE, THETA) > 0:
-        _weigh(like, lanes, THETA, p, 0)
+    while _due(lanes, limits) > 0:
+        _weigh(like, lanes, p)
         if count.shape[1] == 1:
             base = count[NEXT_SAMPLE, 0] * width
             for i in range(width // LANES):
                 stream_at(samples, base + i * LANES, _between(h, step, weights, i))
-        elif _due(lanes, limits, 1, IS_DUE_AFTER, THETA_AFTER) > 0:
-            _weigh(like, lanes, THETA_AFTER, p, p.shape[0])
-            for i in range(0, width, LANES):
-                tile, after = _two_tiles(h, step, weights, i)
-                _keep_tile(samples, count, IS_DUE, 0, i, tile)
-                _keep_tile(samples, count, IS_DUE_AFTER, 1, i, after)
         else:
             for i in range(0, width, LANES):
-                _keep_tile(samples, count, IS_DUE, 0, i, _tile(h, step, weights, i))
+                _keep_tile(samples, count, i, _tile(h, step, weights, i))
         for m in range(count.shape[1]):
-            count[NEXT_SAMPLE, m] += count[IS_DUE, m] + count[IS_DUE_AFTER, m]
+            count[NEXT_SAMPLE, m] += count[IS_DUE, m]

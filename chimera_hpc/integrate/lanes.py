@@ -142,7 +142,7 @@ class LanePool:
             y=aligned(rows, lanes),
             y1=aligned(rows, lanes),
             k=aligned((m.stages + 1) * rows, lanes),
-            weights=aligned(2 * m.stages, LANES),
+            weights=aligned(m.stages, LANES),
             lane=aligned(LANE_ROWS, lanes),
             counters=np.zeros((COUNT_ROWS, lanes), dtype=np.int64),
             samples=samples,

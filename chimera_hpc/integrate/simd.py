@@ -37,7 +37,6 @@ load = _simd.load
 load_at = _simd.load_at
 load_some = _simd.load_some
 magnitude = _simd.magnitude
-prefetch = _simd.prefetch
 real_at = _simd.real_at
 store = _simd.store
 store_at = _simd.store_at

@@ -184,21 +184,6 @@ def stream_at(typing_context, array, offset, vector):
 
 
 @intrinsic
-def prefetch(typing_context, like, array, row):
-    """Prefetch row ``row``, which need not exist, into the first-level cache."""
-
-    def generate(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature, args, _kind_of(like), first=1)
-        pointer = builder.bitcast(pointer, ir.IntType(8).as_pointer())
-        # Arguments of llvm.prefetch: for reading (0), in all cache levels (3), data (1).
-        options = [_INT32(option) for option in (0, 3, 1)]
-        _call(builder, "llvm.prefetch.p0", ir.VoidType(), [pointer, *options])
-        return context.get_dummy_value()
-
-    return types.void(like, array, row), generate
-
-
-@intrinsic
 def load_some(typing_context, array, offset, low, high):
     """Read elements ``low <= j < high`` of a vector as `load_at` does; -0.0 elsewhere."""
 

@@ -85,10 +85,6 @@ def stream_at(array, offset, vector):
     store_at(array, offset, vector)
 
 
-def prefetch(like, array, row):
-    """Prefetch row ``row``, which need not exist, into the first-level cache."""
-
-
 def transposed(vectors):
     """Transpose eight vectors: vector m of the result holds element m of each."""
     return tuple(np.stack(vectors).T.copy())

@@ -11,7 +11,6 @@ from chimera_hpc.integrate.simd import (
     load,
     load_at,
     load_some,
-    prefetch,
     store,
     store_at,
     store_some,
@@ -27,9 +26,6 @@ from chimera_hpc.models.window_sums import (
 )
 
 THIRD = 1.0 / 3.0
-AHEAD = 16
-"""Nodes by which slopes are prefetched. Processors predict reads, but not memory that is only
-written."""
 
 
 @jit()
@@ -54,8 +50,6 @@ def _keep(zero, i, total_y, context):
 @jit()
 def _node(zero, i, total_x, context):
     state, slopes, n, width, numbers = context
-    prefetch(zero, slopes, i + AHEAD)
-    prefetch(zero, slopes, n + i + AHEAD)
     x, y = load(zero, state, i), load(zero, state, n + i)
     pull_x = fma(-width, x, total_x)
     pull_y = fma(-width, y, load(zero, slopes, n + i))

@@ -26,7 +26,6 @@ from chimera_hpc.integrate.simd import (
     load_at,
     load_some,
     magnitude,
-    prefetch,
     store,
     store_at,
     store_some,
@@ -231,18 +230,6 @@ def test_eight_vectors_are_transposed():
     a, out = np.arange(64.0).reshape(8, 8), aligned(8, 8)
     turn(a, out)
     np.testing.assert_array_equal(out, a.T)
-
-
-@pytest.mark.parametrize("row", [-(10**6), -1, 0, 8, 10**6])
-def test_prefetching_reads_and_writes_nothing(row):
-    @numba.njit
-    def ask(array, row):
-        prefetch(broadcast(0.0), array, row)
-        prefetch(0.0, array, row)
-
-    array = np.arange(64.0).reshape(8, 8)
-    ask(array, row)
-    assert array.tolist() == np.arange(64.0).reshape(8, 8).tolist()
 
 
 def test_what_is_not_loaded_is_not_touched():
