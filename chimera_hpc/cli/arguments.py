@@ -46,11 +46,16 @@ def errors_in_one_line(place: Path) -> Iterator[None]:
         raise
 
 
-def folder_name(text: str) -> Path:
-    """Return the folder that an option names."""
+def path_name(text: str) -> Path:
+    """Return the file or folder that an argument names."""
     if not text.strip():
-        raise ArgumentTypeError("empty; the name of a folder is needed")
+        raise ArgumentTypeError("empty; the name of a file or folder is needed")
     return Path(text)
+
+
+def job_name(text: str) -> Path:
+    """Return the job file that an argument names."""
+    return job_file(str(path_name(text)))
 
 
 def memory_size(text: str) -> str:
@@ -85,16 +90,16 @@ _MEMORY = (
     "memory divided by the workers), SLURM is asked for it (default: 1G)"
 )
 _SHARED = {
-    "job": value("JOB.toml", job_file, _JOB),
-    "folder": value("DIR", Path, "the sweep's folder"),
+    "job": value("JOB.toml", job_name, _JOB),
+    "folder": value("DIR", path_name, "the sweep's folder"),
     "point": value("NAME=VALUE", str, "such as P=3 Q=5 seed=7", nargs="+"),
     "--set": value("KEY=VALUE", str, _SET, dest="overrides", action="append", default=[]),
-    "--out": value("DIR", folder_name, "the sweep's folder (default: results/NAME)"),
+    "--out": value("DIR", path_name, "the sweep's folder (default: results/NAME)"),
     "--block": value("N", int, "points per block (default: chosen from the cost)"),
     "--yes": flag("accept a plan of absurd size"),
     "--json": flag("print one JSON object"),
     "--cluster": {"default": "local", "choices": CLUSTERS, "help": _CLUSTER},
-    "--scheduler-file": value("FILE", Path, "file that its scheduler wrote"),
+    "--scheduler-file": value("FILE", path_name, "file that its scheduler wrote"),
     "--workers": value("N", int, "worker processes (default: one per core)"),
     "--mem": value("SIZE", memory_size, _MEMORY),
     "--memory": value("SIZE", memory_size, SUPPRESS),

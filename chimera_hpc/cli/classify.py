@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.wording import short
-from chimera_hpc.cli.arguments import add, add_group, flag, folder_name, value
+from chimera_hpc.cli.arguments import add, add_group, flag, path_name, value
 
 if TYPE_CHECKING:
     from chimera_hpc.job.tables import Features
@@ -46,7 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     setting = "a setting of the table [features], e.g. n_peaks=5; may be repeated"
     along = "what to take along another dimension (NetCDF, Zarr); may be repeated"
     what = "the recording; several, folders and patterns"
-    parser.add_argument("files", nargs="+", **value("FILE", Path, what))
+    parser.add_argument("files", nargs="+", **value("FILE", path_name, what))
     add_group(
         parser,
         "what is what in the file",
@@ -60,7 +60,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser,
         "nodes and times",
         open=flag("a chain: the last node ends it"),
-        links=value("FILE", Path, "network: variations are taken over its links"),
+        links=value("FILE", path_name, "network: variations are taken over its links"),
         order=value("LIST", str, "nodes by name or number from 0, with commas; or a file"),
         drop=value("LIST", str, "columns to leave out, by name or number; or a file of them"),
         start=value("T", float, "first time to take"),
@@ -75,9 +75,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     add(
         parser,
         "--json",
-        atlas=value("STORE", Path, "a reduced sweep's folder"),
+        atlas=value("STORE", path_name, "a reduced sweep's folder"),
         clusters=value("N", _number_of_clusters, "cluster several files: N clusters, or auto"),
-        out=value("DIR", folder_name, "figures (default: FILE-classified, recordings-classified)"),
+        out=value("DIR", path_name, "figures (default: FILE-classified, recordings-classified)"),
         no_figures=flag("no figures"),
     )
 

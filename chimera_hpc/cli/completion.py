@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, Namespace
-from pathlib import Path
 from typing import Any
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.job.shipped import job_file
+from chimera_hpc.cli.arguments import job_name, path_name
 
 EPILOG = """examples:
   chimera-hpc completion bash > ~/.local/share/bash-completion/completions/chimera-hpc
@@ -39,11 +38,11 @@ class _Parser(ArgumentParser):
     """A parser that tells shtab which of its arguments are files and folders."""
 
     def add_argument(self, *names: Any, **options: Any) -> Action:
-        """Declare an argument. Those of a group do not pass here; none of them is a file."""
+        """Declare an argument. Those of a group do not pass here: only --links is a file."""
         import shtab
 
         action = super().add_argument(*names, **options)
-        if action.type in (Path, job_file):
+        if action.type in (path_name, job_name):
             files = shtab.DIR if action.metavar == "DIR" else shtab.FILE
             action.complete = files  # type: ignore[attr-defined]
         return action

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add, flag, store_path, value
+from chimera_hpc.cli.arguments import add, flag, path_name, store_path, value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add(
         parser,
         "folder",
-        to=value("FILE", Path, ".csv, .nc or .zip", required=True),
+        to=value("FILE", path_name, ".csv, .nc or .zip", required=True),
         series=flag("the series of u too (.nc)"),
     )
 

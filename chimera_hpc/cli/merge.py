@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import STORE, add, folder_name, store_path, value
+from chimera_hpc.cli.arguments import STORE, add, path_name, store_path, value
 from chimera_hpc.cli.ending import MOST_LINES, name_of
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ for it; where their results differ it is listed, and the exit status is 1.
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("folders", **value("DIR", Path, "folders of sweeps", nargs="+"))
-    add(parser, out=value("DIR", folder_name, "the new folder", required=True))
+    parser.add_argument("folders", **value("DIR", path_name, "folders of sweeps", nargs="+"))
+    add(parser, out=value("DIR", path_name, "the new folder", required=True))
 
 
 def execute(args: Namespace) -> int:

@@ -35,7 +35,7 @@ _ELEMENT = "SLURM_ARRAY_TASK_ID"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("folder", **value("DIR", Path, "the sweep's folder, or a job file"))
+    parser.add_argument("folder", **value("DIR", path_name, "the sweep's folder, or a job file"))
     add(
         parser,
         *("--set", "--out", "--resubmit"),

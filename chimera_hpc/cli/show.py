@@ -17,7 +17,7 @@ from chimera_hpc.cli.arguments import (
     add,
     errors_in_one_line,
     find_points,
-    folder_name,
+    path_name,
     store_path,
     value,
 )
@@ -54,8 +54,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         *("folder", "point"),
         node=value("J", int, "node of portrait and spectrum (default: features.reference_node)"),
         window=value("K", int, "window of the spectrum (default: 0)", default=0),
-        out=value("DIR", folder_name, "where figures go (default: figures/show)"),
-        animate=value("FILE", Path, "write the run as a film, .gif or .mp4"),
+        out=value("DIR", path_name, "where figures go (default: figures/show)"),
+        animate=value("FILE", path_name, "write the run as a film, .gif or .mp4"),
         periods=value("N", float, "periods of it (default: 5)", default=5.0),
         layout=value("HOW", str, "network: spring, circular, or a file of x, y", default="auto"),
     )

@@ -133,5 +133,6 @@ def _fitting(slurm_options: Slurm, n_blocks: int) -> Slurm:
     wanted = slurm_options.array or ARRAY
     most = min(n_blocks, queue.most_array_elements() or n_blocks)
     if wanted > most:
-        print(f"{most} elements in place of {wanted}: there are {n_blocks} blocks")
+        why = f"there are {n_blocks} blocks" if most == n_blocks else "SLURM allows no more"
+        print(f"{most} elements in place of {wanted}: {why}")
     return slurm_options.model_copy(update={"array": min(wanted, most)})

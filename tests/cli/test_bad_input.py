@@ -1,10 +1,12 @@
 """Bad input is one line on stderr and exit status 2, and nothing is written."""
 
 import os
+from argparse import ArgumentTypeError
 
 import pytest
 from jobs_for_tests import BARE, job_text
 
+from chimera_hpc.cli.main import parser
 from chimera_hpc.sweep import main
 
 JOB = job_text(BARE, {"name": "bad", "grid.seeds": 2})
@@ -108,3 +110,19 @@ def test_scheduler_file_that_is_missing_is_refused(job, tmp_path, capsys):
     arguments = ["run", job, "--out", tmp_path / "out", "--cluster", "scheduler-file"]
     line = refused([*arguments, "--scheduler-file", tmp_path / "none.json"], capsys)
     assert "none.json" in line
+
+
+def test_an_empty_name_of_a_file_or_folder_is_refused_by_every_command(capsys):
+    commands = parser()._subparsers._group_actions[0].choices
+    asked = [(name, action) for name, sub in commands.items() for action in sub._actions]
+    files = {"DIR", "FILE", "STORE", "JOB.toml"}
+    found = [action for _, action in asked if files & {action.metavar}]
+    assert len(found) > 20
+    for action in found:
+        for text in ("", " "):
+            with pytest.raises(ArgumentTypeError, match="empty; the name of a file or folder"):
+                action.type(text)
+    with pytest.raises(SystemExit) as end:
+        main(["export", "results", "--to", ""])
+    assert end.value.code == 2
+    assert "--to: empty" in capsys.readouterr().err

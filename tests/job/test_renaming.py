@@ -140,10 +140,3 @@ def test_a_bare_key_is_looked_up_in_every_table(override: str, table: str, value
 def test_a_bare_key_that_two_tables_have_is_a_parameter() -> None:
     data = {"model": "topological_fhn", "grid": {}}
     assert apply_overrides(data, ["workers=3"])["fixed"] == {"workers": 3}
-
-
-def test_an_empty_folder_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["plan", "quickstart", "--out", ""])
-    assert end.value.code == 2
-    assert "--out: empty" in capsys.readouterr().err

@@ -7,6 +7,7 @@ at 1e-8 of a frequency.
 
 from __future__ import annotations
 
+import inspect
 import os
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
+from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.conventions import PRESETS
 from chimera_hpc.measures.fourier import fourier_features
 from chimera_hpc.measures.variation import total_variations
@@ -62,6 +64,12 @@ def test_a_preset_is_the_same_as_its_settings(stored: dict[str, Array]) -> None:
     assert preset.tobytes() == spelt.tobytes()
     default = fourier_features(T, u, preset="default").as_array()
     assert default.tobytes() == fourier_features(T, u).as_array().tobytes()
+
+
+def test_the_default_preset_holds_the_defaults_of_the_function_and_of_a_job() -> None:
+    arguments = inspect.signature(fourier_features).parameters
+    for name, value in PRESETS["default"].items():
+        assert arguments[name].default == Features.model_fields[name].default == value
 
 
 def test_an_unknown_preset_is_named() -> None:

@@ -18,6 +18,7 @@ from chimera_hpc.job import Sweep, user_models
 from chimera_hpc.job.models import build
 from chimera_hpc.models.held import held_values
 from chimera_hpc.run.second_draw import check_in_second_process, drawn
+from chimera_hpc.store.origin import stored_origin
 from chimera_hpc.store.provenance import differences, model_source
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
@@ -263,6 +264,18 @@ def test_a_store_is_read_without_its_module(
     ):
         assert main([str(word) for word in words]) == 0, capsys.readouterr().err
     assert Store.open(tmp_path / "merged" / "store.zarr").n_points == 4
+
+
+def test_parameters_without_a_column_have_the_type_of_their_value(tmp_path: Path) -> None:
+    spec = {"model": "mine:MODEL", "fixed": {"k": 2, "g": 0.5}, "grid": {"h": [0.1, 0.2]}}
+    root = {
+        "attributes": {"spec": spec | {"integrator": {"form": "reduced"}}},
+        "consolidated_metadata": {"metadata": {"ledger": {"attributes": {"coordinates": "seed"}}}},
+    }
+    table = stored_origin(tmp_path / "store.zarr", root).table
+    assert table is not None
+    found = [(p.name, p.kind, p.default) for p in table.parameters]
+    assert found == [("k", int, 2), ("g", float, 0.5), ("h", float, None)]
 
 
 def test_what_a_model_prints_goes_to_stderr(

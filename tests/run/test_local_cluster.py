@@ -19,6 +19,7 @@ import pytest
 from dask.utils import parse_timedelta
 
 from chimera_hpc.base.memory import usable_memory
+from chimera_hpc.job.tables import Slurm
 from chimera_hpc.run import choice
 from chimera_hpc.run import local_cluster as cluster
 from chimera_hpc.run.local_cluster import local_cluster, settings
@@ -173,3 +174,26 @@ def test_something_is_done_while_the_workers_start() -> None:
     done = Event()
     with local_cluster(1, meanwhile=done.set):
         assert done.wait(timeout=30)
+
+
+@pytest.mark.parametrize(
+    ("kind", "asked", "options", "more"),
+    [
+        ("local", "run.choice.local_cluster", {"workers": 1}, False),
+        ("scheduler-file", "run.choice.existing_cluster", {"scheduler_file": Path("s")}, False),
+        ("slurm", "run.slurm.workers.slurm_cluster", {"slurm_options": Slurm()}, True),
+        ("allocation", "run.slurm.allocation.allocation_cluster", {"slurm_options": Slurm()}, False),
+    ],
+)
+def test_each_choice_starts_or_joins_its_own_cluster(
+    kind: str,
+    asked: str,
+    options: dict[str, Any],
+    more: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: Any = ("client", SimpleNamespace(coming=lambda: True)) if more else "client"
+    monkeypatch.setattr(f"chimera_hpc.{asked}", lambda *given, **options: nullcontext(made))
+    chosen = choice.ExecutorChoice(kind, **options)
+    with chosen.cluster(Path("store"), 9, print, 60.0) as (client, coming):
+        assert (client, coming()) == ("client", more)

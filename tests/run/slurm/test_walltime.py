@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,10 @@ from jobs_for_tests import job_text
 from slurm_sweeps import JOB, write_job
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
+from chimera_hpc.cli.resubmitting import go_on
+from chimera_hpc.cli.slurm import _fitting
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Slurm
 from chimera_hpc.run import block as task
@@ -227,3 +232,52 @@ def test_a_script_says_what_was_wished(mode: str, tmp_path: Path) -> None:
     assert "module load x" in lines
     assert lines[-1].startswith("exec ")
     assert "OMP_NUM_THREADS=1" in text
+
+
+@pytest.mark.parametrize(
+    ("wanted", "allowed", "made", "said"),
+    [
+        (9, None, 9, ""),
+        (10, None, 9, "9 elements in place of 10: there are 9 blocks\n"),
+        (10, 4, 4, "4 elements in place of 10: SLURM allows no more\n"),
+    ],
+)
+def test_an_array_has_as_many_elements_as_there_are_blocks_and_slurm_allows(
+    wanted: int,
+    allowed: int | None,
+    made: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(queue, "most_array_elements", lambda: allowed)
+    assert _fitting(Slurm(array=wanted), 9).array == made
+    assert capsys.readouterr().out == said
+
+
+@pytest.mark.parametrize(
+    ("status", "ended_by", "job", "restarts", "times", "back"),
+    [
+        (Exit.MORE_TO_DO, walltime.NEAR, "7", "1", 2, True),
+        (Exit.MORE_TO_DO, walltime.NEAR, "7", "2", 2, False),
+        (Exit.MORE_TO_DO, walltime.NEAR, "", "0", 2, False),
+        (Exit.MORE_TO_DO, "SIGTERM", "7", "0", 2, False),
+        (Exit.COMPLETE, walltime.NEAR, "7", "0", 2, False),
+    ],
+)
+def test_a_job_goes_back_into_the_queue_when_its_time_is_over(
+    status: int,
+    ended_by: str,
+    job: str,
+    restarts: str,
+    times: int,
+    back: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    requeued: list[str] = []
+    monkeypatch.setattr(queue, "requeue", requeued.append)
+    monkeypatch.setenv("SLURM_JOB_ID", job)
+    monkeypatch.setenv("SLURM_RESTART_COUNT", restarts)
+    driver: Any = SimpleNamespace(ended_by=ended_by)
+    assert go_on(status, driver, times) == status
+    assert requeued == ([job] if back else [])
