@@ -176,13 +176,21 @@ def test_something_is_done_while_the_workers_start() -> None:
         assert done.wait(timeout=30)
 
 
+BY_SLURM = {"slurm_options": Slurm()}
+
+
 @pytest.mark.parametrize(
     ("kind", "asked", "options", "more"),
     [
         ("local", "run.choice.local_cluster", {"workers": 1}, False),
         ("scheduler-file", "run.choice.existing_cluster", {"scheduler_file": Path("s")}, False),
         ("slurm", "run.slurm.workers.slurm_cluster", {"slurm_options": Slurm()}, True),
-        ("allocation", "run.slurm.allocation.allocation_cluster", {"slurm_options": Slurm()}, False),
+        (
+            "allocation",
+            "run.slurm.allocation.allocation_cluster",
+            {"slurm_options": Slurm()},
+            False,
+        ),
     ],
 )
 def test_each_choice_starts_or_joins_its_own_cluster(
