@@ -193,6 +193,8 @@ def _advance(like, rhs, inputs, lanes, method, limits, iterations):
     if n_fresh > 0:
         _start(rhs, inputs, lanes, limits, order)
         n_running += n_fresh
+    # What the right-hand side gets of y and y1: made once, as a new view takes time.
+    state, state1 = y[:size], y1[:size]
     done = 0
     swapped = False
     still_running = n_running
@@ -202,9 +204,9 @@ def _advance(like, rhs, inputs, lanes, method, limits, iterations):
         step = Step(y, y1, k, first * units // rows, units)
         for s in range(1, stages - 1):
             stage_sum(h, step, a, s)
-            rhs(y1[:size], k[s * rows : s * rows + size], params, ints)
+            rhs(state1, k[s * rows : s * rows + size], params, ints)
         last_stage_sum(h, step, a, e)
-        rhs(y1[:size], k[last : last + size], params, ints)
+        rhs(state1, k[last : last + size], params, ints)
         error_sum(zero, h, step, e, limits, lane)
         rejected = _judge(lane, count, size, limits.t_end)
         sample(like, h, step, lanes, method.p, limits)
@@ -217,7 +219,7 @@ def _advance(like, rhs, inputs, lanes, method, limits, iterations):
             if count[STATE, m] == RUNNING:
                 _next_step(lane, count, m, order, limits)
                 still_running += count[STATE, m] == RUNNING
-        y, y1 = y1, y
+        y, y1, state, state1 = y1, y, state1, state
         swapped = not swapped
         first = last
         done += 1
