@@ -153,6 +153,7 @@ def test_a_cell_with_one_seed_has_no_bootstrap(finished: Path, job: Path, sweep:
     assert results_of(folder)["audit"]["bootstrap"]["mean"] is None
 
 
+@pytest.mark.slow
 def test_figures_and_report_show_the_audit(finished: Path, sweep: Run) -> None:
     code, out, _ = sweep("audit", finished, "--workers", 1, "--points", 3)
     assert code == 0

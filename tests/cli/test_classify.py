@@ -229,6 +229,7 @@ def test_gaps_are_listed_bridged_or_cut_at(sweep: Sweep):
     assert "103 values and 3 times missing, in 4 gaps" in out
 
 
+@pytest.mark.slow
 def test_figures_are_written_where_they_are_wanted(
     recorded: tuple[Path, Store, int], sweep: Sweep, tmp_path: Path
 ):

@@ -115,6 +115,7 @@ def test_dask_leaves_the_bits_of_the_serial_run(serial, tmp_path):
     assert_same(tmp_path / "out", contents(serial))
 
 
+@pytest.mark.slow
 def test_a_chain_that_was_killed_goes_on_to_the_same_bits(serial, tmp_path):
     job, out = write_job(tmp_path), tmp_path / "out"
     options = ("run", str(job), "--out", str(out), "--no-figures", "--cluster", "serial")
@@ -174,6 +175,7 @@ def test_an_extension_adds_whole_chains(serial, tmp_path, capsys):
     assert "not the axis of the chains" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_points_behind_a_failed_one_are_not_started_until_it_is_done(tmp_path, capsys):
     changes = {
         "grid__P": [2],

@@ -125,6 +125,7 @@ def test_shares_do_the_rounds_together(decided, sweep: Run, tmp_path):
     assert same(tmp_path / "sweep", decided / "sweep")
 
 
+@pytest.mark.slow
 def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
     words = ("--out", tmp_path / "sweep", "--workers", "2", "--no-figures")
     code, _, _ = sweep("run", decided / "job.toml", *words)

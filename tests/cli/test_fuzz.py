@@ -107,6 +107,7 @@ def test_any_bytes_as_a_job(folder: Path, data: bytes) -> None:
     assert refused_without_a_trace(folder, folder / "job.toml")
 
 
+@pytest.mark.slow
 @MANY
 @given(st.data())
 def test_any_damaged_job(folder: Path, choose: st.DataObject) -> None:

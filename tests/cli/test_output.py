@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from store_tools import make_store
 
 from chimera_hpc.cli.arguments import memory_size
@@ -41,6 +42,7 @@ def test_watch_ends_when_its_reader_does(tmp_path: Path) -> None:
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 def test_memory_has_one_option_and_the_old_name_is_read() -> None:
     assert [memory_size(text) for text in ("2G", "800MB", "2gib", "900")] == [
         "2G",

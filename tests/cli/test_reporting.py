@@ -71,6 +71,7 @@ def test_failure_is_noted_and_the_run_goes_on(
     assert notes == ["no report for now: no store here"]
 
 
+@pytest.mark.slow
 def test_run_writes_reports_on_the_way_and_at_its_end(
     job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -67,6 +67,7 @@ def test_serial_run_has_runs_of_more_than_one_kind(serial):
     assert len(set(serial[2]["digest"].tolist())) > 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", [1, 64])
 def test_block_size_changes_no_bit(block, serial, tmp_path):
     options = ("--cluster", "serial", "--block", str(block))

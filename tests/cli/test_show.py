@@ -91,6 +91,7 @@ def test_other_bits_than_stored_are_said_with_status_one(
     assert "NOT the same" in out
 
 
+@pytest.mark.slow
 def test_cell_shows_its_seeds_and_one_that_stands_for_them(
     finished: Path, store: Store, sweep: Sweep
 ):
@@ -154,6 +155,7 @@ def test_film_without_ffmpeg_is_refused_before_anything_is_computed(
     assert "needs the program ffmpeg" in error
 
 
+@pytest.mark.slow
 def test_gif_has_a_frame_for_each_sample_asked_for(
     finished: Path, store: Store, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
 ):
@@ -201,6 +203,7 @@ def test_spectrum_is_that_of_the_window_that_the_features_come_from(store: Store
     assert features.frequency[1] == pytest.approx(vertex(data)[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_pictures_of_other_nodes_and_windows_are_files_of_their_own(
     finished: Path, store: Store, sweep: Sweep
 ) -> None:

@@ -45,6 +45,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [p for p in PAGES if examples(p)], ids=lambda page: page.stem)
 def test_examples_give_what_the_page_prints(page, small, monkeypatch):
     monkeypatch.chdir(small)

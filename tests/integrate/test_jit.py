@@ -63,6 +63,7 @@ def own_cache(tmp_path, monkeypatch):
 # --- the cache ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing():
     expected = run_here()
     output = python(RUN, NUMBA_DEBUG_CACHE="1").splitlines()
@@ -146,6 +147,7 @@ def calling(x):
 """
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_called_kernel_is_obeyed_by_the_next_process(tmp_path):
     # numba alone serves the old code here: it looks at the file of the outermost function only.
     copy, cache = tmp_path / "chimera_hpc", tmp_path / "cache"
@@ -222,6 +224,7 @@ def test_a_kernel_that_allocates_does_not_compile():
         jit()(allocates)(3)
 
 
+@pytest.mark.slow
 def test_kernels_are_compiled_in_one_place_and_without_fast_math():
     for file in PACKAGE.rglob("*.py"):
         tree = ast.parse(file.read_text())
@@ -261,6 +264,7 @@ def test_a_sum_keeps_its_order_and_products_are_rounded():
 # --- without compilation --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_kernels_do_the_same_without_compilation():
     assert python(RUN, NUMBA_DISABLE_JIT="1") == run_here() + "\n"
 
@@ -281,12 +285,14 @@ def run():
 """
 
 
+@pytest.mark.slow
 def test_vectors_do_the_same_without_compilation():
     here = {}
     exec(RUN_VECTOR, here)
     assert python(RUN_VECTOR + "print(run())", NUMBA_DISABLE_JIT="1") == here["run"]() + "\n"
 
 
+@pytest.mark.slow
 def test_a_processor_without_fused_instructions_gives_the_same_bits(tmp_path):
     # Compiled for the oldest processor of this kind: the C library multiplies and adds there.
     here = {}

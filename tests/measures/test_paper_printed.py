@@ -113,6 +113,7 @@ def test_prominent_maxima_are_those_of_scipy(prominence: float) -> None:
         assert maxima(x, prominence, 7).tolist() == expected[:7].tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="this is the run without JIT")
 def test_the_same_without_jit() -> None:
     some = "triplets or prominent or level"

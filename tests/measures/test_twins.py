@@ -100,6 +100,7 @@ def test_order_parameter_equals_its_twin():
     assert order_parameter(u, w) == pytest.approx(naive.order_parameter(u, w), rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="this is the run without JIT")
 def test_twins_agree_without_jit():
     run = subprocess.run(

@@ -48,6 +48,7 @@ def test_networks_of_the_example_can_be_made(name: str) -> None:
     assert len(sweep.points()) <= 100
 
 
+@pytest.mark.slow
 def test_brain_is_made_by_the_function_next_to_the_job(run: Run) -> None:
     short = (
         "integrator.t_end=60",
@@ -65,6 +66,7 @@ def test_brain_is_made_by_the_function_next_to_the_job(run: Run) -> None:
     assert record["network"].startswith("brain:brain, source ")
 
 
+@pytest.mark.slow
 def test_links_carry_u_and_have_their_pictures(run: Run) -> None:
     short = (
         "integrator.t_end=60",
@@ -145,6 +147,7 @@ def test_ring_given_as_an_edge_list_has_the_signals_of_the_ring(tmp_path: Path) 
     assert np.abs(made[2][:, new] - made[0]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_ring_given_as_edge_lists_has_the_classes_of_the_ring(tmp_path: Path) -> None:
     for half_degree in (9, 12, 21):
         write_ring(tmp_path, half_degree)

@@ -104,6 +104,7 @@ def test_phases_without_a_network_are_on_the_papers_ring():
     assert models[0].phase_lag == 1.4
 
 
+@pytest.mark.slow
 def test_phases_live_on_the_links_of_a_job_that_says_so():
     job = Sweep.from_dict(
         {

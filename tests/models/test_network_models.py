@@ -68,6 +68,7 @@ def test_stuart_landau(network):
     close(slope(model, state), np.concatenate([expected.real, expected.imag]))
 
 
+@pytest.mark.slow
 @networks
 def test_networked_fhn(network):
     n = network.n_nodes
@@ -284,6 +285,7 @@ for model in models:
 """
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits():
     said = []
     for disabled in ("0", "1"):

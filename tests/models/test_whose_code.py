@@ -337,6 +337,7 @@ def test_float32_is_the_default_of_an_own_model(tmp_path: Path) -> None:
     assert json.loads(json.dumps(data))["keep"]["dtype"] == "int16"
 
 
+@pytest.mark.slow
 def test_a_series_that_does_not_fit_ends_the_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

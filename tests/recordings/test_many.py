@@ -120,6 +120,7 @@ def test_files_are_found_in_folders_and_by_patterns(tmp_path: Path) -> None:
             recording_files([word])
 
 
+@pytest.mark.slow
 def test_command_prints_one_table_and_draws_one_sheet(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

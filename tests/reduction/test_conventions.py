@@ -103,6 +103,7 @@ def test_every_line_stands_below_the_name_of_its_convention(both: Path) -> None:
     assert sum("points run" in line for line in lines[second:]) == 1
 
 
+@pytest.mark.slow
 def test_a_job_with_the_preset_has_the_classes_of_the_second_convention(
     both: Path, tmp_path: Path
 ) -> None:

@@ -58,6 +58,7 @@ def told(folder: Path, **options):
     return reduce_sweep(folder, say=lines.append, **options), lines
 
 
+@pytest.mark.slow
 def test_reduction_that_needs_no_run_loads_no_kernels(tmp_path):
     filled(tmp_path, FAST, 'reduction.analyses=["oscillation"]')
     code = "import sys\nfrom pathlib import Path\n"
@@ -216,6 +217,7 @@ def test_folder_without_a_store_is_bad_input(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_importing_outputs_loads_no_matplotlib_and_no_sklearn():
     code = "import chimera_hpc.reduction.reduction, sys\n"
     code += "print(*{n.partition('.')[0] for n in sys.modules})"

@@ -148,6 +148,7 @@ def test_sweep_that_never_oscillates_has_a_page(tmp_path, filled):
     assert [cut["looks"][i]["name"] for i in cut["modal"]] == ["steady"] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("overrides", "axes"),
     [
@@ -191,6 +192,7 @@ def test_claims_of_the_results_are_shown(tmp_path, filled):
     assert "one W is 1 0.5 ✗ no" in words_of(page_of(tmp_path))
 
 
+@pytest.mark.slow
 def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
     wish = ('reduction.analyses=["agreement"]', "reduction.deltas=[0.1]")
     wish += ('reduction.figures=["verdicts"]',)

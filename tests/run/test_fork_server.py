@@ -72,6 +72,7 @@ def looked_at(how: str) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 @linux
 def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() -> None:
     forked, spawned = looked_at("forkserver"), looked_at("spawn")
@@ -159,6 +160,7 @@ def running(job: Path) -> Iterator[subprocess.Popen[str]]:
         driver.kill()
 
 
+@pytest.mark.slow
 @linux
 def test_server_that_still_imports_ends_with_a_killed_driver(
     running: subprocess.Popen[str],
@@ -168,6 +170,7 @@ def test_server_that_still_imports_ends_with_a_killed_driver(
     assert psutil.wait_procs(family, timeout=30)[1] == []
 
 
+@pytest.mark.slow
 @linux
 def test_server_and_workers_end_with_a_killed_driver(running: subprocess.Popen[str]) -> None:
     (server,) = servers(running.pid)
@@ -178,6 +181,7 @@ def test_server_and_workers_end_with_a_killed_driver(running: subprocess.Popen[s
     assert psutil.wait_procs(family, timeout=30)[1] == []
 
 
+@pytest.mark.slow
 @linux
 def test_server_outlives_what_a_batch_system_sends_to_all_processes(
     running: subprocess.Popen[str],
@@ -194,6 +198,7 @@ def test_server_outlives_what_a_batch_system_sends_to_all_processes(
     assert psutil.wait_procs([server, *workers], timeout=30)[1] == []
 
 
+@pytest.mark.slow
 @linux
 @pytest.mark.parametrize("late", [False, True])
 def test_ctrl_c_while_it_imports_or_works_says_nothing_else(

@@ -154,6 +154,7 @@ def test_many_short_calls_are_not_one_long_call(monkeypatch: pytest.MonkeyPatch)
     assert dog is not module.watchdog
 
 
+@pytest.mark.slow
 def test_time_in_which_the_process_was_stopped_does_not_count(tmp_path: Path) -> None:
     code = """
 import time

@@ -80,6 +80,7 @@ def test_files_are_five_per_block_and_few_others(
     assert count_files(store.path) - empty == 5 * store.n_blocks
 
 
+@pytest.mark.slow
 def test_export_of_series_takes_less_memory_than_the_series(
     scale: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

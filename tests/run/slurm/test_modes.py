@@ -20,6 +20,7 @@ pytestmark = pytest.mark.slurm
 ROOT = Path(__file__).parents[3]
 
 
+@pytest.mark.slow
 def test_an_array_gives_the_serial_digests_and_is_reduced(
     slurm: Slurm, serial: Path, tmp_path: Path
 ) -> None:
@@ -31,6 +32,7 @@ def test_an_array_gives_the_serial_digests_and_is_reduced(
     assert (out / "results.json").is_file()
 
 
+@pytest.mark.slow
 def test_an_allocation_gives_the_serial_digests(slurm: Slurm, serial: Path, tmp_path: Path) -> None:
     job, out = write_job(tmp_path), tmp_path / "out"
     done = sweep("slurm", job, "--out", out, "--mode", "allocation", "--submit")
@@ -41,6 +43,7 @@ def test_an_allocation_gives_the_serial_digests(slurm: Slurm, serial: Path, tmp_
     assert not list((tmp_path / "private").iterdir())
 
 
+@pytest.mark.slow
 def test_worker_jobs_give_the_serial_digests(slurm: Slurm, serial: Path, tmp_path: Path) -> None:
     job, out = write_job(tmp_path), tmp_path / "out"
     done = sweep("run", job, "--out", out, "--cluster", "slurm", "--no-figures")
@@ -50,6 +53,7 @@ def test_worker_jobs_give_the_serial_digests(slurm: Slurm, serial: Path, tmp_pat
     assert not list((tmp_path / "private").iterdir())
 
 
+@pytest.mark.slow
 def test_a_driver_in_a_job_of_its_own_gives_the_serial_digests(
     slurm: Slurm, serial: Path, tmp_path: Path
 ) -> None:
@@ -73,6 +77,7 @@ def ways(out: Path) -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_a_sweep_goes_from_an_array_to_an_allocation_to_a_laptop(
     slurm: Slurm, long_serial: Path, tmp_path: Path
 ) -> None:
@@ -102,6 +107,7 @@ def test_a_sweep_goes_from_an_array_to_an_allocation_to_a_laptop(
     assert ways(out) == {"an array", "an allocation", "a laptop"}
 
 
+@pytest.mark.slow
 def test_the_templates_run_a_sweep(
     slurm: Slurm, serial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

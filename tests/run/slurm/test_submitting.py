@@ -66,6 +66,7 @@ def test_a_machine_without_slurm_is_told_so(
         assert done.stderr == "error: sbatch: not found: this is no machine of a SLURM cluster\n"
 
 
+@pytest.mark.slow
 def test_the_reason_of_a_waiting_job_is_told(slurm: Slurm, tmp_path: Path) -> None:
     blocker = slurm.sh(
         *("sbatch", "--parsable", "--exclusive", "-N2", "-o", "/dev/null", "--wrap", "sleep 60")
@@ -136,6 +137,7 @@ def test_arrays_are_cut_to_what_slurm_allows(slurm: Slurm, tmp_path: Path) -> No
     assert len(slurm.queue()) == 10
 
 
+@pytest.mark.slow
 def test_cancel_ends_the_jobs_of_its_own_store_only(slurm: Slurm, tmp_path: Path) -> None:
     job = write_job(tmp_path)
     hold = ("--set", "slurm.extra=['--hold']")
