@@ -18,7 +18,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.together import points_of
-from chimera_hpc.reduction.cells import FreeAxis, free_axes
+from chimera_hpc.reduction.cells import FreeAxis, decided_class, free_axes
 from chimera_hpc.store.origin import stored_origin
 
 if TYPE_CHECKING:
@@ -54,7 +54,9 @@ class Cells:
     cell: NDArray[np.int64]
     """Cell of each point."""
     classes: Sequence[str | None]
-    """Modal class of each cell by results.json; None where unknown, empty without results.json."""
+    """Class of each cell by results.json, with [decide] its decided one, else its modal class.
+
+    None where unknown, empty without results.json."""
 
     @classmethod
     def read(cls, store: Path, metadata: Mapping[str, Any]) -> Cells | None:
@@ -87,9 +89,12 @@ def _classes(path: Path, n_cells: int) -> list[str | None]:
     try:
         if path.stat().st_size > _MOST_RESULTS:
             return []
-        cuts = json.loads(path.read_bytes())["cuts"]
-        cells = next(iter(cuts.values()))["cells"]
-        classes = [cell["class"] for cell in cells]
+        results = json.loads(path.read_bytes())
+        if "decide" in results:
+            classes = [decided_class(cell) for cell in results["decide"]["cells"]]
+        else:
+            cells = next(iter(results["cuts"].values()))["cells"]
+            classes = [cell["class"] for cell in cells]
     except (OSError, ValueError, KeyError, TypeError, AttributeError, StopIteration):
         return []
     return classes if len(classes) == n_cells else []

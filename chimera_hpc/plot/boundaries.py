@@ -30,7 +30,8 @@ def boundaries_figure(data: FigureInput) -> Figure | None:
         if isinstance(cells[0][name], int | float)
         and np.array_equal(values, numbers([cell[name] for cell in cells]))
     }
-    return boundaries(axes, cells, data.decided["boundaries"], places)
+    judge = f"by the {data.decided['decide']['judge']}"
+    return boundaries(axes, cells, data.decided["boundaries"], places, judge)
 
 
 @style.styled
@@ -39,6 +40,7 @@ def boundaries(
     cells: Cells,
     found: Cells,
     places: Mapping[str, int],
+    title: str = "",
 ) -> Figure:
     """Draw cells and boundaries.
 
@@ -57,6 +59,7 @@ def boundaries(
     for boundary in found:
         _draw_boundary(panel, boundary, places, len(axes))
     style.set_ticks(panel.xaxis, x)
+    panel.set_title(style.plain(title))
     panel.set_xlabel(axes[0][0])
     panel.set_ylabel("share of the class" if len(axes) == 1 else axes[1][0])
     style.add_class_legend(figure, filter(None, (cell["class"] for cell in cells)), [])

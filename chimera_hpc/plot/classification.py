@@ -27,6 +27,7 @@ def classification_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     leaf_labels, n_runs = cut.labels[tree.members], int(np.count_nonzero(cut.labels >= 0))
     draw_dendrogram(axes[0], tree.linkage, leaf_labels, cut.names, height_of(tree, cut), n_runs)
     draw_projection(axes[1], data.triplets, cut.labels, cut.names)
+    axes[2].set_title(data.judged_elsewhere)
     style.letter(axes)
     draw_modal_classes(axes[2], data.axes, classes, data.votes(n_clusters))
     discs = vote_handles() if len(data.axes) == 1 else []

@@ -91,6 +91,11 @@ class FigureInput:
         """The axis of a sweep that has one."""
         return self.axes[0] if len(self.axes) == 1 else None
 
+    @property
+    def judged_elsewhere(self) -> str:
+        """What the modal classes are by, for a sweep whose cells are decided by other classes."""
+        return "by the tree of all runs" if self.decided else ""
+
     def classes(self, n_clusters: int) -> list[str | None]:
         """Return the modal class of each cell (n_cells,) by a cut."""
         return [cell["class"] for cell in self.cells[n_clusters]]

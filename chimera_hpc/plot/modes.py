@@ -34,12 +34,16 @@ def modal_classes_figure(data: FigureInput, n_clusters: int) -> Figure | None:
     if len(data.axes) not in (1, 2) or not any(classes):
         return None
     kept = data.kept.get(n_clusters)
-    return modal_classes(data.axes, classes, data.votes(n_clusters), kept)
+    return modal_classes(data.axes, classes, data.votes(n_clusters), kept, data.judged_elsewhere)
 
 
 @style.styled
 def modal_classes(
-    parameters: Parameters, classes: Classes, votes: Votes = (), kept: ArrayLike | None = None
+    parameters: Parameters,
+    classes: Classes,
+    votes: Votes = (),
+    kept: ArrayLike | None = None,
+    title: str = "",
 ) -> Figure:
     """Draw the modal class of each cell; arguments as in `draw_modal_classes`.
 
@@ -48,6 +52,7 @@ def modal_classes(
     size = (0.8, 2.3) if len(parameters) == 1 else (1.2, 3.2)
     figure, (axes,) = style.new_panels(1, style.COLUMN + size[0], size[1])
     draw_modal_classes(axes, parameters, classes, votes)
+    axes.set_title(title)
     if len(parameters) == 2:
         loose = [] if kept is None else open_loose_cells(axes, parameters, classes, kept)
         style.add_class_legend(figure, filter(None, classes), loose)

@@ -18,6 +18,8 @@ SYMBOLS = {
     "flips": "Q_r",
 }
 """How parameters are written in figures, where it is not their name."""
+UNDECIDED = "undecided"
+"""What tables and maps of letters show of a cell whose class is not decided."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +83,12 @@ def describe(row: Mapping[str, int | float], axes: Sequence[FreeAxis], math: boo
             text = " = ".join([*words, value])
             parts.append(f"${text}$" if math else text)
     return ", ".join(parts)
+
+
+def decided_class(cell: Mapping[str, Any]) -> str | None:
+    """Return what tables show of an entry of ``decide.cells``; None where no run has a vote."""
+    name: str | None = cell["class"]
+    return name if name is None or cell["decided"] else UNDECIDED
 
 
 def number(value: float, digits: int = 4) -> str:

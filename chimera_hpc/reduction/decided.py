@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from chimera_hpc.classify.modes import count_votes, modal_labels, vote_labels
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.axes import Same
 from chimera_hpc.models.parameters import Column
-from chimera_hpc.reduction.cells import FreeAxis, describe
+from chimera_hpc.reduction.cells import FreeAxis, decided_class, describe
+from chimera_hpc.reduction.table import DECIDED
 from chimera_hpc.run.rounds import Standing, judged
 from chimera_hpc.store.store import Store
 
@@ -25,31 +26,44 @@ MOST_LINES = 20
 """Boundaries that are printed one by one."""
 
 
-def decided_results(
+def judge_words(sweep: Sweep) -> str:
+    """Return what gives the runs of a sweep with [decide] their classes."""
+    other = sweep.decide is not None and sweep.decide.judge == "atlas"
+    return f"atlas {sweep.reduction.atlas[0]}" if other else "tree of the first round"
+
+
+def standing_by(
     store: Store,
-    cut: Cut,
     status: NDArray[np.int64],
     triplets: NDArray[np.float64],
     atlases: Mapping[str, Atlas],
-) -> dict[str, Any]:
-    """Return ``decide`` and ``boundaries`` of results.json; empty for a job without [decide].
+) -> Standing | None:
+    """Return how far the cells are decided; None without [decide], and without its judge.
 
-    Also empty while the atlas that judges is missing. Under another convention than the sweep's
-    own, the votes are those of that convention, of the runs that the own one asked for.
-
-    cut: that of the tree over all runs, with which the judge is compared.
+    Under another convention than the sweep's own, the votes are those of that convention, of the
+    runs that the own one asked for.
     """
     sweep, atlas = store.sweep, None
     if sweep.decide is None:
-        return {}
+        return None
     if sweep.decide.judge == "atlas":
         atlas = atlases.get(sweep.reduction.atlas[0])
         if atlas is None:
-            return {}
+            return None
     n_first = len(store.sweeps[0].points())
-    now = judged(sweep, store.points, triplets, status, n_first, atlas)
-    found = now.found
-    names = now.names
+    return judged(sweep, store.points, triplets, status, n_first, atlas)
+
+
+def decided_results(
+    store: Store, now: Standing | None, cut: Cut, status: NDArray[np.int64]
+) -> dict[str, Any]:
+    """Return ``decide`` and ``boundaries`` of results.json; empty where nothing is decided.
+
+    cut: that of the tree over all runs, with which the judge is compared.
+    """
+    if now is None:
+        return {}
+    found, names = now.found, now.names
     cells = [
         {name: now.cells[name][i].item() for name in now.axes}
         | {
@@ -58,6 +72,7 @@ def decided_results(
             "runs": int(now.runs[i]),
             "share": float(found.share[i]),
             "interval": [float(found.low[i]), float(found.high[i])],
+            "votes": {names[j]: int(now.votes[i, j]) for j in np.flatnonzero(now.votes[i])},
         }
         for i in range(len(now.runs))
     ]
@@ -67,6 +82,7 @@ def decided_results(
             "runs": store.n_points,
             "full_grid": now.decide.full_grid(store.sweep.axes, now.n_grid),
             "confidence": now.decide.confidence,
+            "judge": judge_words(store.sweep),
             "agreement": _agreement(store, now, cut, status),
             "cells": cells,
         },
@@ -125,6 +141,16 @@ def _roots(sweep: Sweep, name: str) -> tuple[str, ...]:
     return (name, *_roots(sweep, axis.name)) if isinstance(axis, Same) else (name,)
 
 
+def tables_of(results: Mapping[str, Any], cuts: Sequence[int]) -> dict[str, list[Any]]:
+    """Return the cells of each cut, before them, as `DECIDED`, those with their decided classes."""
+    tables = {str(k): results["cuts"][str(k)]["cells"] for k in cuts}
+    if "decide" not in results:
+        return tables
+    both = zip(results["decide"]["cells"], tables[str(cuts[0])], strict=True)
+    decided = [{**cell, "class": decided_class(d), "votes": d["votes"]} for d, cell in both]
+    return {DECIDED: decided, **tables}
+
+
 def decided_lines(results: Mapping[str, Any], axes: list[FreeAxis]) -> Iterator[str]:
     """Yield the lines of the terminal; none for a job without [decide]."""
     decide = results.get("decide")
@@ -142,8 +168,9 @@ def decided_lines(results: Mapping[str, Any], axes: list[FreeAxis]) -> Iterator[
     shares = decide["agreement"]
     if shares["runs"] is not None:
         cells_too = "" if shares["cells"] is None else f", {shares['cells']:.1%} of decided cells"
-        yield f"judge: {shares['runs']:.1%} of the runs have this class in the tree of all runs" + (
-            cells_too
+        yield (
+            f"judge: {decide.get('judge', 'not known')}; {shares['runs']:.1%} of the runs have its "
+            f"class in the tree of all runs{cells_too}"
         )
     found = results["boundaries"]
     for boundary in found[:MOST_LINES]:

@@ -21,7 +21,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import temporary_name
 from chimera_hpc.base.status import Status
 from chimera_hpc.reduction.netcdf3 import Layout, resized
-from chimera_hpc.store.labelled import open_sweep, reductions
+from chimera_hpc.store.labelled import cuts_in, open_sweep, reductions
 from chimera_hpc.store.store import Store
 from chimera_hpc.store.strips import PackedSeries
 
@@ -209,7 +209,7 @@ def _classes(store: Store) -> dict[str, NDArray[Any]]:
     """Return each point's class in each cut of the last reductions."""
     classes = {}
     for suffix, reduction in reductions(store):
-        for cut in reduction.attributes.get("cuts", []):
+        for cut in cuts_in(reduction):
             # The label -1 of points without a class takes the last name.
             names = np.array([*reduction.attributes[f"names_{cut}"], ""])
             labels = reduction.arrays[f"labels_{cut}"]

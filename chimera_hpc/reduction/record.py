@@ -11,6 +11,7 @@ from chimera_hpc.classify.atlas import Atlas, Variable
 from chimera_hpc.classify.classification import Classification, Cut
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY, CellTable, modal_classes
 from chimera_hpc.reduction.results import TRIPLET
+from chimera_hpc.run.rounds import Standing
 
 
 def reduction_variables(
@@ -42,6 +43,19 @@ def reduction_variables(
         attributes[f"depth_{asked}"] = cut.depth
     atlas_variables, atlas_attributes = Atlas.of(classification).variables()
     return variables | atlas_variables, attributes | atlas_attributes
+
+
+def decided_variables(now: Standing) -> tuple[dict[str, Variable], dict[str, Any]]:
+    """Return the classes by which the cells of a sweep with [decide] are decided.
+
+    ``labels_judge`` over points and ``modal_class_judge`` over cells are positions in the attribute
+    ``names_judge``, -1 where there is none.
+    """
+    return {
+        "labels_judge": (("point",), now.labels),
+        "modal_class_judge": (("cell_number",), now.found.leader),
+        "decided": (("cell_number",), now.found.decided),
+    }, {"names_judge": list(now.names)}
 
 
 def _cut_variables(

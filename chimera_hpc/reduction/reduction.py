@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.files import remove_leftovers, temporary_name, write_atomically
 from chimera_hpc.classify.atlas import Atlas, Variable
-from chimera_hpc.classify.classification import Classification, classify
+from chimera_hpc.classify.classification import Classification, Cut, classify
 from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.classify.modes import run_names
 from chimera_hpc.job.class_names import naming_rule, overridden
@@ -24,13 +24,14 @@ from chimera_hpc.reduction.audit_runs import runs_of
 from chimera_hpc.reduction.cells import FreeAxis, free_axes
 from chimera_hpc.reduction.chains import chain_lines, chain_results
 from chimera_hpc.reduction.conventions import OWN, conventions, seen_under
-from chimera_hpc.reduction.decided import decided_lines, decided_results
+from chimera_hpc.reduction.decided import decided_lines, decided_results, standing_by, tables_of
 from chimera_hpc.reduction.quality import poor_classes, quality_warnings
-from chimera_hpc.reduction.record import reduction_variables
+from chimera_hpc.reduction.record import decided_variables, reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, json_safe, to_json
 from chimera_hpc.reduction.selection import check_selections
 from chimera_hpc.reduction.stability import one_state, tree_warnings
-from chimera_hpc.reduction.table import class_table
+from chimera_hpc.reduction.table import DECIDED, class_table
+from chimera_hpc.run.rounds import Standing
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import write_reduction
 from chimera_hpc.store.schema import sample_times
@@ -139,6 +140,7 @@ class _Work:
         self.curves: dict[str, Any] = {}
         self.chains: dict[str, Any] = {}
         self.atlases: dict[str, Atlas] = {}
+        self.standing: Standing | None = None
         self.decided: dict[str, Any] = {}
         self.table = ""
 
@@ -173,8 +175,8 @@ class _Work:
         ]
         self.curves = self.results["curves"]
         cut = made.cuts[self.cuts[0]]
-        found = decided_results(store, cut, self.status, self.triplets, self.atlases)
-        self.decided = json_safe(found)
+        self.standing = standing_by(store, self.status, self.triplets, self.atlases)
+        self.decided = json_safe(decided_results(store, self.standing, cut, self.status))
         self.results |= self.decided
         names = run_names(cut.labels, self.status, cut.names)
         self.chains = json_safe(chain_results(store, names, self.scalars))
@@ -191,11 +193,11 @@ class _Work:
         self._say(_coverage(self.results["points"]))
         self._explain_missing_classes()
         r_squared = self.quality["r_squared"]
-        self.table = class_table(
-            {str(k): self.results["cuts"][str(k)]["cells"] for k in self.cuts},
-            self.axes,
-            {name for k in self.cuts for name in poor_classes(made.cuts[k], r_squared)},
-        )
+        cuts: dict[str, Cut] = {str(k): made.cuts[k] for k in self.cuts}
+        if self.standing is not None:
+            cuts[DECIDED] = self.standing.cut
+        poor = {name: poor_classes(cut, r_squared) for name, cut in cuts.items()}
+        self.table = class_table(tables_of(self.results, self.cuts), self.axes, poor)
 
     def _write(self) -> None:
         if self.convention == OWN:
@@ -253,6 +255,9 @@ class _Work:
             variables[f"judge_{number}_labels"] = (("point",), judged.label)
             variables[f"judge_{number}_distance"] = (("point",), judged.distance)
             attributes[f"judge_{number}"] = {"sweep": name, **names}
+        if self.standing is not None:
+            more, named = decided_variables(self.standing)
+            variables, attributes = variables | more, attributes | named
         return variables, attributes
 
     @property
@@ -300,7 +305,10 @@ class _Work:
         store, made = self.store, self.classification
         first = made.cuts[self.cuts[0]]
         runs = run_names(first.labels, self.status, first.names)
-        for atlas in list(self.atlases.values())[:1]:  # the judge's names, where there is one
+        if (now := self.standing) is not None:
+            runs = run_names(now.labels, self.status, now.judge.names)
+        # Otherwise the names of the first atlas, where there is one.
+        for atlas in list(self.atlases.values())[: now is None]:
             labels = np.where(first.labels >= 0, atlas.classify(self.triplets).label, -1)
             runs = run_names(labels, self.status, atlas.names)
         return FigureInput(

@@ -18,29 +18,35 @@ Cells = Sequence[Mapping[str, Any]]
 MOST_LINES = 60
 WIDTH = 100
 """Limits of a table for the terminal; beyond them it says less."""
+DECIDED = "decided"
+"""Stands for a cut: the classes by which the cells of a sweep with [decide] are decided."""
 _NOTHING = "."
 
 
 def class_table(
-    cuts: Mapping[str, Cells], axes: Sequence[FreeAxis], poor: Collection[str] = ()
+    cuts: Mapping[str, Cells],
+    axes: Sequence[FreeAxis],
+    poor: Mapping[str, Collection[str]] | None = None,
 ) -> str:
     """Return the modal classes as text, with the share of the runs that oscillate.
 
     cuts: for each cut its cells with ``class`` and ``votes``, in one order (as in results.json).
         The first cut is the one that maps and counts show.
     axes: what varies between cells.
-    poor: classes whose runs are poorly fitted; they are marked.
+    poor: for each cut its classes whose runs are poorly fitted; they are marked.
     """
     if not cuts:
         return ""
-    cuts = {cut: [_marked(cell, poor) for cell in cells] for cut, cells in cuts.items()}
+    bad = poor or {}
+    cuts = {c: [_marked(cell, bad.get(c, ())) for cell in cells] for c, cells in cuts.items()}
     cut, cells = next(iter(cuts.items()))
     if len(axes) < 2 and len(cells) <= MOST_LINES:
         return _lines(cuts, axes)
     if len(axes) == 1:
         text = _ranges(cells, axes[0])
     elif len(axes) == 2 and (drawn := _map(cells, axes[0], axes[1])):
-        text = f"modal classes of {cut} clusters\n{drawn}"
+        which = "decided classes" if cut == DECIDED else f"modal classes of {_head(cut)}"
+        text = f"{which}\n{drawn}"
     else:
         text = _counts(cells)
     return f"{text}\n{_whose(cells)}"
@@ -70,7 +76,7 @@ def _whose(cells: Cells) -> str:
 def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
     columns = [[axis.plain, *map(axis.label, axis.values)] for axis in axes]
     for i, (cut, cells) in enumerate(cuts.items()):
-        columns.append([f"{cut} clusters", *(cell["class"] or _NOTHING for cell in cells)])
+        columns.append([_head(cut), *(cell["class"] or _NOTHING for cell in cells)])
         if i == 0:
             columns.append(["oscillating", *(_oscillating(cell) for cell in cells)])
             columns.append(["votes", *(_votes(cell) for cell in cells)])
@@ -80,6 +86,10 @@ def _lines(cuts: Mapping[str, Cells], axes: Sequence[FreeAxis]) -> str:
         for row in zip(*columns, strict=True)
     ]
     return "\n".join(rows)
+
+
+def _head(cut: str) -> str:
+    return cut if cut == DECIDED else f"{cut} clusters"
 
 
 def _oscillating(cell: Mapping[str, Any]) -> str:

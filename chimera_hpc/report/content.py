@@ -20,12 +20,16 @@ from chimera_hpc.job.class_names import naming_rule
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
 from chimera_hpc.reduction.reduction import RESULTS
 from chimera_hpc.reduction.results import TRIPLET, count_points, read_results
+from chimera_hpc.run.judge import other_judge
+from chimera_hpc.run.rounds import Standing, judged
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.ledger import LedgerScan
 from chimera_hpc.store.store import Store
 
 Integers = NDArray[np.int64]
 
+JUDGE = "judge"
+"""Stands for a cut: the classes by which the cells of a sweep with [decide] are decided."""
 MOST_CLUSTERS = 8
 """The movable cut goes from 2 to this many clusters, and to those that the job asks for."""
 
@@ -113,6 +117,27 @@ class Content:
         return free_axes(self.columns, names)
 
     @cached_property
+    def standing(self) -> Standing | None:
+        """How far the cells of a sweep with [decide] are decided; None without one.
+
+        Also None while the judge is not there: before the end of the first round, or without the
+        atlas that judges.
+        """
+        sweep, n_first = self.store.sweep, len(self.store.sweeps[0].points())
+        if sweep.decide is None or (self.status[:n_first] == Status.NEVER).any():
+            return None
+        try:
+            atlas = other_judge(self.store)
+        except BadInput:
+            return None
+        return judged(sweep, self.store.points, self.triplets, self.status, n_first, atlas)
+
+    @cached_property
+    def opening(self) -> Cut:
+        """The classes that the page opens with: those by which cells are decided, or the tree's."""
+        return self.cuts[self.first_cut] if self.standing is None else self.standing.cut
+
+    @cached_property
     def cuts(self) -> dict[int, Cut]:
         """Cuts by their number of clusters, rising: the first that the job names, and others.
 
@@ -130,8 +155,14 @@ class Content:
         return {k: real[k] for k in sorted(chosen)}
 
     @cached_property
+    def named_cuts(self) -> dict[str, Cut]:
+        """The cuts, and the classes of the judge as `JUDGE`, by their names on the page."""
+        judge = {} if self.standing is None else {JUDGE: self.standing.cut}
+        return {**judge, **{str(k): cut for k, cut in self.cuts.items()}}
+
+    @cached_property
     def first_cut(self) -> int:
-        """Number of clusters that the page opens with: the first that the job names."""
+        """Number of clusters of the cut that is shown first: the first that the job names."""
         spec, made = self.store.sweep.reduction, self.classification.cuts
         asked = [*spec.cuts, *(k for k, cut in made.items() if cut.depth == spec.depth), *made]
         return next((k for k in asked if len(made[k].names) == k), next(iter(made)))

@@ -38,7 +38,7 @@ from chimera_hpc.reduction.audit_text import (
     sample_line,
 )
 from chimera_hpc.reduction.chains import chain_lines
-from chimera_hpc.reduction.decided import decided_lines
+from chimera_hpc.reduction.decided import decided_lines, judge_words
 from chimera_hpc.reduction.results import TRIPLET
 from chimera_hpc.report import charts
 from chimera_hpc.report.content import Content
@@ -107,6 +107,7 @@ def page(content: Content, most_pictures: int = MOST_CELLS, replay: bool = True)
         "words": _words(content, shown, pictured.sentence),
         "data": _script_safe(payload(content, shown, pictured, top)),
         "axes": axis_labels(content),
+        "judge": content.standing is not None,
         "outcomes": _outcomes(content),
         "warnings": content.results.get("warnings", []),
         "robustness_axis": _robustness_axis(content),
@@ -236,6 +237,7 @@ def _words(content: Content, shown: Shown, pictures: str) -> dict[str, str]:
         "map": f"{n_shown} of {n_cells} cells are on the map, spread evenly."
         if n_shown < n_cells
         else "",
+        "judge": _judge(content),
         "voters": f"{kind}runs",
         "projections": f"{n_drawn} of {clustered} {kind}runs, spread evenly."
         if n_drawn < clustered
@@ -251,6 +253,22 @@ def _words(content: Content, shown: Shown, pictures: str) -> dict[str, str]:
         "why": f"python -m chimera_hpc.sweep why {_place(content.folder)}",
         "status": f"python -m chimera_hpc.sweep status --failures {_place(content.folder)}",
     }
+
+
+def _judge(content: Content) -> str:
+    """Say which classes the map of a sweep with [decide] shows; nothing for another."""
+    sweep = content.store.sweep
+    if sweep.decide is None:
+        return ""
+    judge = judge_words(sweep)
+    if content.standing is not None:
+        return (
+            f"These are the classes by which cells are decided, by the {judge}; a cell with an "
+            "open mark is not decided. The tree of all runs may have others: choose it below."
+        )
+    return f"Cells are decided by the {judge}, which is not there (yet); " + (
+        "the map shows the classes of the tree of all runs."
+    )
 
 
 def _some(n: int, what: str) -> str:

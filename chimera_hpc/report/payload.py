@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.status import Status
-from chimera_hpc.classify.classification import has_triplet
+from chimera_hpc.classify.classification import Cut, has_triplet
 from chimera_hpc.reduction.quality import poor_classes
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import looks_of
@@ -73,7 +73,8 @@ def payload(content: Content, shown: Shown, plates: Plates, top: TreeTop) -> dic
                 for k, name in enumerate(("V_theta", "V_a", "V_Omega"))
             },
         },
-        "cuts": {str(k): _cut(content, shown, top, k) for k in content.cuts},
+        "cuts": {name: _cut(content, shown, top, cut) for name, cut in content.named_cuts.items()},
+        "open": _open(content, shown),
         "tree": {"xs": top.xs, "ys": top.ys, "ends": top.ends, "sizes": top.sizes},
         "plates": {str(row_of[i]): plate for i, plate in plates.by_cell.items() if row_of[i] >= 0},
         "networks": list(plates.networks),
@@ -101,13 +102,18 @@ def _cells(content: Content, shown: Shown) -> dict[str, Any]:
     }
 
 
-def _cut(content: Content, shown: Shown, top: TreeTop, k: int) -> dict[str, Any]:
-    cut = content.cuts[k]
+def _open(content: Content, shown: Shown) -> list[bool]:
+    """Return which of the cells shown are not decided; empty without a judge."""
+    now = content.standing
+    return [] if now is None else (~now.found.decided[shown.cells]).tolist()
+
+
+def _cut(content: Content, shown: Shown, top: TreeTop, cut: Cut) -> dict[str, Any]:
     counted = content.votes(cut)
     members = content.classification.members
     return {
         "looks": looks_of(counted.names, poor_classes(cut, content.r_squared)),
-        "sizes": cut.sizes.tolist(),
+        "sizes": np.bincount(cut.labels[cut.labels >= 0], minlength=len(cut.names)).tolist(),
         "depth": rounded(cut.depth, 6),
         "modal": counted.modal[shown.cells].tolist(),
         "votes": counted.votes[shown.cells].tolist(),

@@ -128,7 +128,7 @@ def representatives(content: Content) -> NDArray[np.int64]:
     A run of the modal class comes before others, a run whose series is kept before others, the
     first before later ones.
     """
-    cut = content.cuts[content.first_cut]
+    cut = content.opening
     label = vote_labels(cut.labels, content.status, len(cut.names))
     typical = label == content.votes(cut).modal[content.cell]
     kept = series_mask(content.store.sweep, content.store.points.columns["seed"])
@@ -210,7 +210,7 @@ def _plate(content: Content, i: int, features: Array | None) -> dict[str, Any]:
     plate: dict[str, Any] = {
         "point": content.point_words(i),
         "status": Status(int(content.status[i])).sentence,
-        "classes": {str(k): int(cut.labels[i]) for k, cut in content.cuts.items()},
+        "classes": {name: int(cut.labels[i]) for name, cut in content.named_cuts.items()},
     }
     if np.isfinite(content.triplets[i]).all():
         plate["variations"] = [rounded(v) for v in content.triplets[i].tolist()]

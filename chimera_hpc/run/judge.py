@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.classify.atlas import Atlas
+from chimera_hpc.classify.atlas import UNCLASSIFIED, Atlas
 from chimera_hpc.classify.classification import classify
 from chimera_hpc.classify.naming import Rule
 from chimera_hpc.job import Sweep
@@ -20,6 +20,9 @@ from chimera_hpc.job.tables import Reduction
 from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import sibling
 from chimera_hpc.store.store import Store
+
+
+_ONE_CLASS = Atlas(np.zeros((2, 3)), np.zeros((1, 3)), np.zeros(1, np.int64), (UNCLASSIFIED,))
 
 
 def other_judge(store: Store) -> Atlas | None:
@@ -44,7 +47,10 @@ def other_judge(store: Store) -> Atlas | None:
 def frozen_judge(
     sweep: Sweep, triplets: NDArray[np.float64], status: NDArray[np.int64], n_first: int
 ) -> Atlas:
-    """Return the classes of the tree over the first `n_first` runs, in the first cut."""
+    """Return the classes of the tree over the first `n_first` runs, in the first cut.
+
+    Where none of these runs has a class, all later ones are of one, `UNCLASSIFIED`.
+    """
     first = slice(n_first)
     return _first_tree(
         triplets[first].tobytes(), status[first].tobytes(), sweep.reduction, naming_rule(sweep)
@@ -64,4 +70,4 @@ def _first_tree(triplets: bytes, status: bytes, spec: Reduction, rule: Rule) -> 
         names=rule,
     )
     cut = made.cuts[spec.cuts[0]] if spec.cuts else next(iter(made.cuts.values()))
-    return Atlas.of(made, cut)
+    return Atlas.of(made, cut) if cut.names else _ONE_CLASS

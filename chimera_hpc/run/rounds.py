@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.classify.boundaries import new_cells
-from chimera_hpc.classify.classification import TRIPLET, has_triplet
+from chimera_hpc.classify.classification import TRIPLET, Cut, has_triplet
 from chimera_hpc.classify.deciding import SILENT, Decisions, decisions, expected_runs
 from chimera_hpc.classify.modes import NO_WINDOW, STEADY, count_votes, vote_labels
 from chimera_hpc.job import Points, Sweep
@@ -54,6 +54,12 @@ class Standing:
     def names(self) -> tuple[str, ...]:
         """Names of the columns of `votes`."""
         return (*self.judge.names, STEADY, NO_WINDOW)
+
+    @property
+    def cut(self) -> Cut:
+        """The judge's classes of all runs as a cut, though of no tree over them."""
+        names, unknown = self.judge.names, np.full((len(self.judge.names), 3), np.nan)
+        return Cut(self.labels, names, names, unknown, self.judge.sizes, np.nan)
 
     @cached_property
     def found(self) -> Decisions:

@@ -110,6 +110,12 @@ def reductions(store: Store) -> Iterator[tuple[str, StoredReduction]]:
                 yield suffix, found
 
 
+def cuts_in(reduction: StoredReduction) -> list[str]:
+    """Return what the arrays of a reduction's classes are called by: cuts, and the judge's."""
+    found = [str(cut) for cut in reduction.attributes.get("cuts", [])]
+    return [*found, "judge"] if "names_judge" in reduction.attributes else found
+
+
 def _classes(
     store: Store, status: NDArray[np.int64], scalars: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, tuple[str, NDArray[np.str_], dict[str, str]]]:
@@ -119,7 +125,7 @@ def _classes(
         arrays = reduction.arrays
         codes = scalars.get(f"status{suffix}", status)
         still = np.where(codes == Status.STEADY, -3, np.where(codes == Status.NO_WINDOW, -2, -1))
-        for cut in reduction.attributes.get("cuts", []):
+        for cut in cuts_in(reduction):
             labels, modal = arrays[f"labels_{cut}"], arrays[f"modal_class_{cut}"]
             # The names end with those of runs without a class: steady, no_window, "".
             names = np.array([*reduction.attributes[f"names_{cut}"], ""])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,12 +16,17 @@ from jobs_for_tests import SMALL, job_text
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.atlas import UNCLASSIFIED
 from chimera_hpc.classify.classification import TRIPLET, Classification, Cut
+from chimera_hpc.cli.cell_map import Cells
 from chimera_hpc.job.points import point_keys
 from chimera_hpc.plot.boundaries import boundaries_figure
 from chimera_hpc.plot.figure_input import FigureInput
 from chimera_hpc.reduction.atlases import load_atlas
+from chimera_hpc.reduction.decided import tables_of
+from chimera_hpc.reduction.export import table
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.page import page as report_of
+from chimera_hpc.store.labelled import open_sweep
+from chimera_hpc.store.ledger import read_metadata
 from chimera_hpc.store.store import Store
 from chimera_hpc.sweep import main
 
@@ -49,6 +56,13 @@ def results(folder: Path) -> dict[str, Any]:
     return found
 
 
+def data_of(page: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found is not None
+    data: dict[str, Any] = json.loads(found.group(1))
+    return data
+
+
 def same(folder: Path, other: Path) -> bool:
     ours, theirs = (Store.open(place / "store.zarr") for place in (folder, other))
     keys = point_keys(ours.points).tolist() == point_keys(theirs.points).tolist()
@@ -65,7 +79,8 @@ def test_results_hold_cells_and_boundaries(decided):
     assert {0.0 <= decide["agreement"][key] <= 1.0 for key in ("runs", "cells")} == {True}
     for cell in decide["cells"]:
         low, high = cell["interval"]
-        assert set(cell) == {"P", "Q", "class", "decided", "runs", "share", "interval"}
+        keys = {"P", "Q", "class", "decided", "runs", "share", "interval", "votes"}
+        assert set(cell) == keys
         assert low <= cell["share"] <= high
         assert 4 <= cell["runs"] <= 10
         assert cell["decided"] or cell["runs"] == 10
@@ -143,8 +158,9 @@ def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
     assert "decide.judge: atlas none: " in err
     lost = Store.open(decided / "lost" / "store.zarr").ledger()["status"]
     assert (lost == Status.NEVER).all()
-    code, _, _ = sweep(*job, *changes, "--out", decided / "judged", "--set", 'atlas="sweep"')
+    code, out, _ = sweep(*job, *changes, "--out", decided / "judged", "--set", 'atlas="sweep"')
     assert code == 0
+    assert "judge: atlas sweep; " in out
     store = Store.open(decided / "judged" / "store.zarr")
     atlas = load_atlas(decided / "sweep")
     scalars = store.scalars()
@@ -154,6 +170,41 @@ def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
         mine = named[(store.points.cells()[0] == rows) & (named != UNCLASSIFIED)].tolist()
         assert cell["runs"] in (2, 4)
         assert cell["class"] == "steady" or mine.count(cell["class"]) == max(map(mine.count, mine))
+    lost_page = report_of(Content.read(decided / "lost"), most_pictures=0, replay=False)
+    assert "decided by the atlas none, which is not there (yet)" in lost_page
+    assert "judge" not in data_of(lost_page)["cuts"]
+    rows = list(csv.DictReader(table(store)))
+    assert [row["class_judge"] or UNCLASSIFIED for row in rows] == named.tolist()
+
+
+@pytest.mark.parametrize("name", ["sweep", "judged"])
+def test_map_table_page_and_results_show_the_classes_by_which_cells_are_decided(
+    decided, sweep: Run, name
+):
+    folder = decided / name
+    cells = results(folder)["decide"]["cells"]
+    for cell in cells:
+        assert sum(cell["votes"].values()) <= cell["runs"]
+        assert cell["class"] in cell["votes"]
+    shown = [cell["class"] if cell["decided"] else "undecided" for cell in cells]
+    data = data_of(report_of(Content.read(folder), most_pictures=0, replay=False))
+    judge = data["cuts"]["judge"]
+    looks = [look["name"] for look in judge["looks"]]
+    assert [looks[i] for i in judge["modal"]] == [cell["class"] for cell in cells]
+    assert data["open"] == [not cell["decided"] for cell in cells]
+    found = Cells.read(folder / "store.zarr", read_metadata(folder / "store.zarr"))
+    assert found is not None
+    assert found.classes == shown
+    tables = tables_of(results(folder), [2])
+    assert [cell["class"] for cell in tables["decided"]] == shown
+    assert "2" in tables
+    _, out, _ = sweep("reduce", folder, "--no-figures")
+    head = "decided classes" if name == "sweep" else "P  decided  "
+    assert any(line.startswith(head) for line in out.splitlines())
+    dataset = open_sweep(folder)
+    assert dataset.modal_class_judge.values.tolist() == [
+        cells[i]["class"] for i in dataset.cell.values
+    ]
 
 
 def test_report_tells_decided_cells(decided):

@@ -485,7 +485,7 @@ def test_table_of_few_cells_has_a_line_for_each():
 
 def test_table_marks_classes_that_are_poorly_fitted():
     cells = {"3": cells_of(["ordered", "chimera"])}
-    table = class_table(cells, [FreeAxis(("P",), np.array([9, 12]))], {"ordered"})
+    table = class_table(cells, [FreeAxis(("P",), np.array([9, 12]))], {"3": {"ordered"}})
     assert table.splitlines()[1:] == [
         "9   ordered*    100%         ordered* 2",
         "12  chimera     100%         chimera 2",

@@ -5,7 +5,8 @@
   const $ = (id) => document.getElementById(id);
   const cells = data.cells, n = cells.name.length, flat = data.axes.length < 2;
   const cutNames = Object.keys(data.cuts);
-  const state = { cut: data.first, shade: "class", row: null, slice: [], quiet: false };
+  const trees = cutNames.filter((name) => name !== "judge");
+  const state = { cut: cutNames.includes("judge") ? "judge" : data.first, tree: data.first, shade: "class", row: null, slice: [], quiet: false };
   let source, model;
 
   const sum = (list) => list.reduce((a, b) => a + b, 0);
@@ -21,9 +22,11 @@
     return some.map(([v, look]) => `${look.sign} ${look.name} ${v}`).join(", ") || "none yet";
   }
 
+  const isOpen = (row) => state.cut === "judge" && data.open[row];
+
   function className(row) {
     const look = cut().looks[cut().modal[row]];
-    return look ? `${look.sign} ${look.name}` : "no result yet";
+    return look ? `${look.sign} ${look.name}${isOpen(row) ? " (not decided)" : ""}` : "no result yet";
   }
 
   function shareText(row) {
@@ -58,8 +61,8 @@
       columns.votes.push(votesText(votes[row], looks));
       columns.entropy.push(bits.toFixed(3));
       columns.runs.push(runsText(row));
-      columns.colour.push(look.colour);
-      columns.line.push(look.line);
+      columns.colour.push(isOpen(row) ? "#ffffff" : look.colour);
+      columns.line.push(isOpen(row) ? look.colour : look.line);
       columns.marker.push(look.marker);
       columns.size.push(modal[row] < 0 ? 4 : size);
       if (flat) {
@@ -112,7 +115,7 @@
 
   function drawTree() {
     if (!data.tree.sizes.length) return;
-    const { looks, leaves, depth } = cut(), tree = data.tree;
+    const { looks, leaves } = cut(), { depth } = data.cuts[state.tree], tree = data.tree;
     source("merges").data = {
       xs: tree.xs, ys: tree.ys,
       colour: tree.ends.map(([a, b]) => leaves[a] === leaves[b] ? looks[leaves[a]].colour : "#777777"),
@@ -124,7 +127,8 @@
       runs: tree.sizes,
     };
     model("cut").location = depth;
-    $("tree-clusters").textContent = `${state.cut} clusters at depth ${Number(depth.toPrecision(3))}`;
+    $("tree-clusters").textContent = `${state.tree} clusters at depth ${Number(depth.toPrecision(3))}`;
+    if ($("judged")) $("judged").hidden = state.cut !== "judge";
   }
 
   function drawLegend() {
@@ -139,7 +143,7 @@
       item.append(sign, `${look.name}: ${others[i]} runs`);
       return [item];
     }));
-    $("cut-words").textContent = state.cut;
+    $("cut-words").textContent = state.tree;
   }
 
   function fillTable() {
@@ -330,13 +334,15 @@
 
   function setCut(name) {
     state.cut = name;
-    $("cut").value = String(cutNames.indexOf(name));
-    $("cut").setAttribute("aria-valuetext", `${name} clusters`);
+    if (name !== "judge") state.tree = name;
+    if ($("by")) $("by").value = name === "judge" ? "judge" : "tree";
+    $("cut").value = String(trees.indexOf(state.tree));
+    $("cut").setAttribute("aria-valuetext", `${state.tree} clusters`);
     drawAll();
   }
 
   function cutAt(height) {
-    const above = cutNames.map((name) => [Math.abs(data.cuts[name].depth - height), name]);
+    const above = trees.map((name) => [Math.abs(data.cuts[name].depth - height), name]);
     setCut(above.sort((a, b) => a[0] - b[0])[0][1]);
   }
 
@@ -365,9 +371,10 @@
     $("cell").addEventListener("change", (event) => choose(event.target.value === "" ? null : Number(event.target.value)));
     $("previous").addEventListener("click", () => step(-1));
     $("next").addEventListener("click", () => step(1));
-    $("cut").max = String(cutNames.length - 1);
-    $("cut").disabled = cutNames.length < 2;
-    $("cut").addEventListener("input", (event) => setCut(cutNames[Number(event.target.value)]));
+    $("cut").max = String(trees.length - 1);
+    $("cut").disabled = trees.length < 2;
+    $("cut").addEventListener("input", (event) => setCut(trees[Number(event.target.value)]));
+    $("by")?.addEventListener("change", (event) => setCut(event.target.value === "judge" ? "judge" : state.tree));
     $("network-by")?.addEventListener("change", () => { if (state.row !== null && data.plates[state.row]) drawNetwork(data.plates[state.row]); });
     $("shade")?.addEventListener("change", (event) => { state.shade = event.target.value; drawMap(); });
     for (const picker of document.querySelectorAll(".slice")) {
