@@ -21,7 +21,6 @@ from chimera_hpc.store.labelled import STORE_NAME
 from chimera_hpc.store.reduction import sibling
 from chimera_hpc.store.store import Store
 
-
 _ONE_CLASS = Atlas(np.zeros((2, 3)), np.zeros((1, 3)), np.zeros(1, np.int64), (UNCLASSIFIED,))
 
 
