@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import log_expit
-from scipy.stats import chi2
+from scipy.special import chdtri, log_expit
 
 _PLACES = 101
 _SLOPES = 40
@@ -38,7 +37,7 @@ def crossing(
         z = slopes[:, None, None] * (x - places[:, None])
         likelihood = (high * log_expit(z) + low * log_expit(-z)).sum(axis=2).max(axis=0)
         short = likelihood.max() - likelihood
-        held = places[2.0 * short <= chi2.ppf(confidence, 1)]
+        held = places[2.0 * short <= chdtri(1, 1.0 - confidence)]
         first, last = max(x[0], held[0] - step), min(x[-1], held[-1] + step)
     best = places[short < 1e-6]
     return float((best[0] + best[-1]) / 2.0), float(held[0]), float(held[-1])

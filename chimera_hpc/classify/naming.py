@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from string import ascii_uppercase
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.classify.tree import Floats, Integers
+
+if TYPE_CHECKING:  # SciPy's trees take half a second, and commands that only name classes none
+    from chimera_hpc.classify.tree import Floats, Integers
 
 CLASSES = ("ordered", "chimera", "disordered")
 STEADY, NO_WINDOW = "steady", "no_window"
