@@ -141,7 +141,7 @@ def draw(out: Path | None, one: Recorded, settings: Features, judge: Judge | Non
         profiles = [profiles_of(found.features.as_array())]
         figures["profiles"] = fourier_indicators(profiles, [title], names)
         node = settings.reference_node
-        data, _ = window_spectrum(made.t, made.u, settings, node, 0)
+        data, _ = window_spectrum(made.t, made.u.T, settings, node, 0)
         figures["spectrum"] = spectrum(data, plain(f"{called(names[node])}, window 0"))
     if judge is not None and found.verdict is not None:
         low, high = judge.atlas.scaler

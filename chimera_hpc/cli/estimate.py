@@ -20,9 +20,9 @@ LANES_PER_SAMPLE = 64
 MOST_SIDE_BY_SIDE = 96_000_000
 """Bytes per sample of eight trajectories, and the most for which they are integrated side by side
 (``SAMPLE_BYTES`` of `integrate.lanes`, which takes a second to load)."""
-_PROCESS_BYTES, _POINT_BYTES, _MEASURED_BYTES = 190_000_000, 110, 37
+_PROCESS_BYTES, _POINT_BYTES, _MEASURED_BYTES = 190_000_000, 110, 24
 """Measured: a worker with its kernels; per point that it holds; per sample of a node, for u and w
-of one trajectory and their copies node by node."""
+of one trajectory, which are turned node by node in place, and u as it is stored."""
 
 
 @dataclass(frozen=True)

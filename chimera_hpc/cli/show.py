@@ -81,7 +81,7 @@ def execute(args: Namespace) -> int:
         check_film(args.animate)
     first = representative(store, chosen) if len(chosen) > 1 else chosen[0]
     shown = sorted({first, *[i for i in chosen if i != first][: _SIDE_BY_SIDE - 1]})
-    runs = replay(store, shown)
+    runs = replay(store, shown, first)
     for run in runs:
         _tell(store, run)
     if len(chosen) > len(runs):
@@ -194,8 +194,7 @@ def _figures(
         )
     if focus.n_windows:
         settings = store.sweep.features
-        u = focus.u.at(slice(None))
-        data, text = window_spectrum(focus.t, u, settings, node, window)
+        data, text = window_spectrum(focus.t, focus.u, settings, node, window)
         word = style.SIGNALS[signals]
         print(text.replace("node", word, 1))
         figures[f"spectrum{at_node}{at_window}"] = spectrum(data, f"{word} {node}, window {window}")

@@ -1,4 +1,7 @@
-"""Time series: transposition to contiguous nodes, and rounding to integers."""
+"""Time series: transposition to contiguous nodes, and rounding to integers.
+
+Long series take the memory of a machine, so that two signals are turned within their own.
+"""
 
 from __future__ import annotations
 
@@ -15,21 +18,27 @@ Array = NDArray[np.float64]
 _TILE = 64
 
 
-def quantise(
-    rows: Array, scale: float, missing: int, stored: NDArray[np.int16], back: Array
-) -> int:
-    """Write a series as integers, ``round(rows / scale)``, and the values that these represent.
+def quantise(rows: Array, scale: float, missing: int, stored: NDArray[np.int16]) -> int:
+    """Write a series as integers, ``round(rows / scale)``, and return how many values are missing.
 
     A value that is NaN or needs more than ``-missing - 1`` steps is stored as ``missing``.
 
     rows (N, T): the series. Fastest if it is contiguous in the nodes, as the integrator writes it.
     stored (T, N): int16
-    back (N, T): set to ``stored * scale``.
-
-    Returns the number of missing values. Their entries in ``back`` are undefined.
     """
-    number: int = _quantise(*_time_by_time(rows), scale, missing, stored, back)
+    number: int = _quantise(*_time_by_time(rows), scale, missing, stored)
     return number
+
+
+@jit()
+def restore(stored: Any, scale: float, out: Any) -> None:
+    """Write the values of integers stored (T, N), ``stored * scale``, node by node (N, T)."""
+    n_times, n_nodes = stored.shape
+    for first in range(0, n_times, _TILE):
+        last = min(first + _TILE, n_times)
+        for i in range(n_nodes):
+            for t in range(first, last):
+                out[i, t] = stored[t, i] * scale
 
 
 @jit()
@@ -49,6 +58,38 @@ def by_node(rows: Array, out: Array) -> Array:
     return out
 
 
+def turn_in_place(u: Array, w: Array) -> tuple[Array, Array] | None:
+    """Return room for a signal (N, T), and w with contiguous rows, in the memory of u and w.
+
+    u, w (N, T): time by time, each an array of its own, or parts of the samples of one run, as the
+    integrator writes them, with u before w. Both are destroyed. None, and nothing is done, if they
+    lie in memory in another way.
+    """
+    if u.shape != w.shape or u is w or not (u.flags.writeable and w.flags.writeable):
+        return None
+    if all(x.flags.f_contiguous and x.flags.owndata for x in (u, w)):
+        room, turned = (x.T.reshape(u.shape) for x in (w, u))
+        _turn(w.T.reshape(-1), len(w), turned)
+        return room, turned
+    return _turn_half(u, w)
+
+
+def _turn_half(u: Array, w: Array) -> tuple[Array, Array] | None:
+    (n, n_times), size = u.shape, u.itemsize
+    (step, odd_step), (gap, odd_gap) = (
+        divmod(offset, size) for offset in (u.strides[1], w.ctypes.data - u.ctypes.data)
+    )
+    apart = n_times > 1 and n <= gap <= step - n and not (odd_step or odd_gap)
+    if not (apart and u.strides == w.strides and u.strides[0] == size):
+        return None
+    line = np.lib.stride_tricks.as_strided(u, ((n_times - 1) * step + gap + n,), (size,))
+    half, shape = n * n_times, (n, n_times)
+    _pack(line, gap, step, n, n_times)
+    turned = line[half : 2 * half].reshape(shape)
+    _turn(line[:half], n, turned)
+    return line[:half].reshape(shape), turned
+
+
 def _time_by_time(rows: Array) -> tuple[Array, int]:
     """Return rows (n, T) as a flat array, and its stride from one time to the next.
 
@@ -64,24 +105,27 @@ def _time_by_time(rows: Array) -> tuple[Array, int]:
 
 
 @jit()
-def _quantise(line: Any, step: int, scale: float, missing: int, stored: Any, back: Any) -> int:
+def _quantise(line: Any, step: int, scale: float, missing: int, stored: Any) -> int:
     n_times, n_nodes = stored.shape
     limit = -(missing + 1.0)
     lost = 0
-    for first in range(0, n_times, _TILE):
-        last = min(first + _TILE, n_times)
-        for t in range(first, last):
-            here, out = line[t * step : t * step + n_nodes], stored[t]
-            for i in range(n_nodes):
-                # Compared before the conversion, because the integer of a NaN is undefined.
-                steps = np.rint(here[i] / scale)
-                fits = abs(steps) <= limit
-                lost += 0 if fits else 1
-                out[i] = np.int32(steps) if fits else missing
+    for t in range(n_times):
+        here, out = line[t * step : t * step + n_nodes], stored[t]
         for i in range(n_nodes):
-            for t in range(first, last):
-                back[i, t] = stored[t, i] * scale
+            # Compared before the conversion, because the integer of a NaN is undefined.
+            steps = np.rint(here[i] / scale)
+            fits = abs(steps) <= limit
+            lost += 0 if fits else 1
+            out[i] = np.int32(steps) if fits else missing
     return lost
+
+
+@jit()
+def _pack(line: Any, first: int, step: int, n: int, n_times: int) -> None:
+    """Move n values out of every `step`, from `first` on, to the front, one time after another."""
+    for t in range(n_times):
+        for i in range(n):
+            line[t * n + i] = line[t * step + first + i]
 
 
 @jit()

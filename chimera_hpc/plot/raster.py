@@ -184,7 +184,7 @@ def _is_slow(u: NodeSeries, dots: int) -> bool:
     low[:, :-1] = np.fmin(low[:, :-1], following)
     high[:, :-1] = np.fmax(high[:, :-1], following)
     whole = high.max(axis=1, keepdims=True) - low.min(axis=1, keepdims=True)
-    moving = whole[:, 0] > _FLAT * np.nanmax(np.abs(rows))
+    moving = whole[:, 0] > _FLAT * np.nanmax(np.abs([low, high]))
     return bool(np.mean((high - low > 0.5 * whole)[moving]) <= _JUMPS)
 
 

@@ -15,6 +15,7 @@ from chimera_hpc.classify.modes import run_names
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.fourier import window_lines
+from chimera_hpc.plot.raster import NodeSeries
 from chimera_hpc.plot.spectrum import Spectrum
 from chimera_hpc.plot.style import drawn
 from chimera_hpc.reduction.cells import describe, free_axes
@@ -40,7 +41,7 @@ class Replay:
     title: parameters that vary, seed and class.
     t (T,): sample times of the analysis interval.
     u: as it is stored, missing after the end of a run that failed.
-    w (T', N): the second signal, at the last T' times.
+    w (T', N): the second signal, at the last T' times; T' = 0 where it was not asked for.
     features (8, N): NaN unless the status is DONE.
     triplet (3,): V_theta, V_a, V_Omega.
     digest, stored: digest of what came out now, and of what the store holds, None where the point
@@ -83,14 +84,16 @@ class Replay:
         return 1.0 / frequency if frequency > 0.0 else float("nan")
 
 
-def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
+def replay(store: Store, chosen: Sequence[int], focus: int | None = None) -> list[Replay]:
     """Compute points of a store again; their bits do not depend on one another.
 
     Large ones are computed one after the other, so that only one has its buffers in memory.
+
+    focus: the only one of them whose w is kept; without it, that of all is.
     """
     size = store.sweep.n_observed * len(sample_times(store.sweep))
     if len(chosen) > 1 and size * len(chosen) > _AT_ONCE:
-        return [run for i in chosen for run in replay(store, [i])]
+        return [run for i in chosen for run in replay(store, [i], focus)]
     from chimera_hpc.run.block import run_block
 
     which = np.asarray(chosen, dtype=np.int64)
@@ -98,8 +101,9 @@ def replay(store: Store, chosen: Sequence[int]) -> list[Replay]:
 
     def keep(row: int, u: NDArray[Any], w: Array) -> None:
         few = max(1, min(len(u), _MOST_W // u.shape[1]))
+        first = len(u) - few if focus in (None, which[row]) else len(u)
         # The buffer of a single point is not used again.
-        signals[row] = SeriesInMemory(u if len(which) == 1 else u.copy()), w[:, -few:].T.copy()
+        signals[row] = SeriesInMemory(u if len(which) == 1 else u.copy()), w[:, first:].T.copy()
 
     starts = store.starts(which)
     made = run_block(store.sweep, store.points[which], on_signals=keep, starts=starts)
@@ -163,25 +167,30 @@ def representative(store: Store, chosen: Sequence[int]) -> int:
 
 
 def window_spectrum(
-    t: Array, u: Array, settings: Features, node: int, window: int
+    t: Array, u: NodeSeries, settings: Features, node: int, window: int
 ) -> tuple[Spectrum, str]:
     """Return what the Fourier method saw of one node in one window, and a line that says it.
 
-    t (T,), u (T, N); settings: how the sweep measures; node, window: both from 0.
+    t (T,), u (N, T): a run that was measured by these settings, and oscillates; node, window: both
+    from 0. Only the node and the one whose maxima place the windows are read.
 
     Raises BadInput: there is no such node or window.
     """
-    if not 0 <= node < u.shape[1]:
-        raise BadInput(f"--node {node}: allowed is 0 to {u.shape[1] - 1}")
+    if not 0 <= node < u.shape[0]:
+        raise BadInput(f"--node {node}: allowed is 0 to {u.shape[0] - 1}")
     options = settings.options()
     del options["phase_mean"], options["steady"]
-    lines = window_lines(t, u, **options)
-    row = node if settings.window_reference == "own" else 0
+    y = u[node : node + 1]
+    clock = node if settings.window_reference == "own" else settings.reference_node
+    rows = np.concatenate([u[clock : clock + 1], y])
+    # The mean deviation of these two is not that of the run.
+    lines = window_lines(t, rows.T, **{**options, "reference_node": 0, "steady_threshold": 0.0})
+    row = len(lines.counts) - 1
     count = int(lines.counts[row])
     if not 0 <= window < count:
         raise BadInput(f"--window {window}: allowed is 0 to {count - 1}")
     part = slice(int(lines.first[row, window]), int(lines.last[row, window]) + 1)
-    y, place = u[part, node], (node, window)
+    y, place = y[0, part], (1, window)
     samples = y - y.mean()
     amplitude = 2.0 / len(y) * np.abs(np.fft.rfft(samples))
     frequency = np.fft.rfftfreq(len(y), (t[-1] - t[0]) / (len(t) - 1))

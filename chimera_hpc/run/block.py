@@ -23,7 +23,7 @@ from chimera_hpc.job.registry import measures, method
 from chimera_hpc.measures.fourier import NodeFeatures, measure_signals
 from chimera_hpc.measures.measure import Measure, MeasuredRun
 from chimera_hpc.measures.quality import quality
-from chimera_hpc.measures.series import by_node, quantise, round_to
+from chimera_hpc.measures.series import by_node, quantise, restore, round_to, turn_in_place
 from chimera_hpc.models.network_model import PhaseModel
 from chimera_hpc.models.protocol import Model
 from chimera_hpc.network.sweep_network import pairs_of
@@ -83,22 +83,34 @@ def _lane_groups(models: list[Model]) -> Iterator[list[int]]:
     yield from groups.values()
 
 
-def store_as(u: Array, stored: NDArray[Any], back: Array) -> Array:
-    """Write a signal (N, T) as a store keeps it, and return what the store gives back, in `back`.
+def store_as(u: Array, stored: NDArray[Any]) -> bool:
+    """Write a signal (N, T) as a store keeps it, (T, N); tell if every value fits."""
+    if stored.dtype == np.int16:
+        return not quantise(u, SCALE, MISSING, stored)
+    with np.errstate(over="ignore"):  # what does not fit is found by `_misfit`
+        stored[:] = u.T
+    return True
+
+
+def as_measured(u: Array, w: Array, stored: NDArray[Any], fits: bool) -> tuple[Array, Array]:
+    """Return u as the store gives it back, and w, both (N, T) with contiguous rows.
 
     What is measured is what is stored: a maximum between two nearly equal samples would otherwise
     move to the other one, and its window with it, when the features are recomputed from the
     store. Values beyond the range of int16, which the store does not keep, are rounded alike.
 
-    stored (T, N): in the type of the store.
+    stored (T, N), fits: what `store_as` made of u. The memory of u and w is used again, if it can
+    be: a long run has no other of this size.
     """
+    room = turn_in_place(u, w) if fits else None
+    back, turned = room or (np.empty(u.shape), by_node(w, np.empty(w.shape)))
     if stored.dtype != np.int16:
-        with np.errstate(over="ignore"):  # what does not fit is found by `_misfit`
-            stored[:] = u.T
         back[:] = stored.T
-    elif quantise(u, SCALE, MISSING, stored, back):
+    elif fits:
+        restore(stored, SCALE, back)
+    else:
         round_to(by_node(u, back), SCALE, back)
-    return back
+    return back, turned
 
 
 class DoesNotFit(BadInput):
@@ -148,9 +160,7 @@ class _Block:
         self.keeps = series_mask(sweep, points.columns["seed"])
         width = max(model.n_nodes + model.n_second for model in self.models)
         self.result = empty_result(sweep, n, width if starts is None else starts.shape[1])
-        # Of the run being measured: u as stored, u and w node by node.
-        shape = (sweep.n_observed, len(times))
-        self.u, self.w = np.empty(shape), np.empty(shape)
+        # u of the run being measured, as it is stored, where the result has no room for it.
         self.stored: NDArray[Any] | None = None
 
     def integrate(
@@ -200,25 +210,26 @@ class _Block:
     def measure(self, row: int, outcome: Outcome) -> None:
         result, model = self.result, self.models[row]
         result.status[row] = outcome.status
-        if self.on_signals is not None:
-            outcome.samples[:, outcome.n_sampled :] = np.nan
-            u, w = model.node_pair(outcome.samples)
-            stored = self.room_for(model.n_nodes, None)
-            store_as(u, stored, self.u[: model.n_nodes])
-            self.on_signals(row, stored, w)
-        if outcome.status is not Status.DONE:
+        is_done = outcome.status is Status.DONE
+        if not is_done and self.on_signals is None:
             return
+        outcome.samples[:, outcome.n_sampled :] = np.nan
         with foreign_code():
             u, w = model.node_pair(outcome.samples)
-        kept = result.series[row] if result.series is not None and self.keeps[row] else None
+        is_kept = is_done and result.series is not None and self.keeps[row]
+        kept = result.series[row] if is_kept and result.series is not None else None
         stored = self.room_for(model.n_nodes, kept)
-        signal, u = u, store_as(u, stored, self.u[: model.n_nodes])
+        fits = store_as(u, stored)
+        if self.on_signals is not None:
+            self.on_signals(row, stored, w)
+        if not is_done:
+            return
         if kept is not None:
-            if reason := _misfit(signal, stored):
+            if reason := _misfit(u, stored):
                 raise DoesNotFit(f"{self.place(row)}: {reason}")
             if stored is not kept:
                 kept[:, : model.n_nodes] = stored
-        w = by_node(w, self.w[: model.n_nodes])
+        u, w = as_measured(u, w, stored, fits)
         if result.state is not None:
             last = _carried(model, *self.last(row, outcome.y_end))
             result.state[row, : len(last)] = last
@@ -313,7 +324,7 @@ def warm_up_features(sweep: Sweep, model: Model) -> None:
     _measure(measures(sweep.measures.panel), run)
     # In the integrator's order: time by time.
     samples = np.repeat(rows, 2, axis=0).T.copy().T
-    back = np.empty(rows.shape)
-    stored = np.empty(back.shape[::-1], dtype=np.int16)
-    round_to(by_node(samples[:3], back), SCALE, back)
-    store_as(samples[:3], stored, back)
+    stored = np.empty(rows.shape[::-1], dtype=np.int16)
+    for fits in (False, True):
+        store_as(samples[:3], stored)
+        as_measured(samples[:3], samples[3:], stored, fits)

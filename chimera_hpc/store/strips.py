@@ -70,6 +70,10 @@ class StoredSeries:
         parts = [self.packed((0, self.shape[1]), strip) for strip in strips]
         return decode_series(np.concatenate([np.empty((0, self.shape[1]), self._type), *parts]))
 
+    def in_memory(self) -> SeriesInMemory:
+        """Return the whole series, as it is stored."""
+        return SeriesInMemory(self.packed((0, self.shape[1]), (0, self.shape[0])).T)
+
     def packed(self, times: tuple[int, int], nodes: tuple[int, int]) -> NDArray[Any]:
         """Return u as it is stored, (nodes, times), from the first time and node to the last."""
         found = np.full((nodes[1] - nodes[0], times[1] - times[0]), self._fill, self._type)
@@ -158,7 +162,7 @@ class SeriesInMemory:
         self._stored = stored
         self.shape = stored.shape[::-1]
 
-    def __getitem__(self, nodes: slice) -> NDArray[np.float64]:
+    def __getitem__(self, nodes: slice | NDArray[np.int64]) -> NDArray[np.float64]:
         """Return u of some nodes, (nodes, T)."""
         return decode_series(self._stored[:, nodes].T)
 

@@ -185,7 +185,7 @@ def test_spectrum_is_that_of_the_window_that_the_features_come_from(store: Store
     settings = store.sweep.features
     t = 0.01 * np.arange(4001)
     u = np.stack([np.cos(2.0 * np.pi * t), 3.0 + 2.0 * np.cos(4.0 * np.pi * t - 1.0)], axis=1)
-    data, text = window_spectrum(t, u, settings, node=1, window=0)
+    data, text = window_spectrum(t, u.T, settings, node=1, window=0)
     # Node 0 is the clock: 1 turn a unit of time, 3 maxima, so two turns after the first maximum.
     assert len(np.asarray(data.t)) == 201
     assert np.asarray(data.t)[[0, -1]] == pytest.approx([1.0, 3.0])
@@ -195,7 +195,7 @@ def test_spectrum_is_that_of_the_window_that_the_features_come_from(store: Store
     exact = settings.model_copy(update={"refine": "sine-fit"})
     for origin in ("window", "absolute"):
         refined = exact.model_copy(update={"time_origin": origin})
-        fitted = window_spectrum(t, u, refined, node=1, window=1)[0]
+        fitted = window_spectrum(t, u.T, refined, node=1, window=1)[0]
         assert np.asarray(fitted.fit) == pytest.approx(np.asarray(fitted.y), abs=1e-6)
     assert "node 1, window 0 of" in text
     names = ("n_peaks", "n_overlap", "window_reference", "reference_node")

@@ -9,15 +9,16 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from store_tools import encode_series
 
-from chimera_hpc.measures.series import by_node, quantise, round_to
+from chimera_hpc.measures.series import by_node, quantise, restore, round_to, turn_in_place
 from chimera_hpc.store.schema import MISSING, SCALE
 
 
 def quantised(rows):
     out = np.full(rows.shape[::-1], 12345, dtype=np.int16)
-    back = np.empty(rows.shape)
-    lost = quantise(rows, SCALE, MISSING, out, back)
+    lost = quantise(rows, SCALE, MISSING, out)
     assert lost == np.count_nonzero(out == MISSING)
+    back = np.empty(rows.shape)
+    restore(out, SCALE, back)
     np.testing.assert_array_equal(back.T, out * SCALE)
     return out
 
@@ -113,3 +114,64 @@ def test_rows_of_any_layout_are_turned_and_quantised_alike(rows):
     assert turned.flags.c_contiguous
     np.testing.assert_array_equal(turned, rows)
     np.testing.assert_array_equal(quantised(rows), encode_series(rows.T, np.int16))
+
+
+@pytest.mark.parametrize(
+    ("width", "first", "second", "n"),
+    [(8, 0, 4, 4), (8, 0, 3, 3), (16, 1, 12, 4), (24, 0, 16, 8), (8, 6, 7, 1)],
+)
+@pytest.mark.parametrize("n_times", [2, 63, 64, 200])
+def test_two_signals_are_turned_within_their_memory(width, first, second, n, n_times):
+    samples = np.random.default_rng(2).random((n_times + 2, width))
+    before = samples.copy()
+    u, w = (samples[1:-1, at : at + n].T for at in (first, second))
+    expected = w.copy()
+    room, turned = turn_in_place(u, w)
+    for rows in (room, turned):
+        assert rows.shape == (n, n_times)
+        assert rows.flags.c_contiguous
+        assert rows.flags.writeable
+        assert np.shares_memory(rows, samples)
+    np.testing.assert_array_equal(turned, expected)
+    room[:] = -1.0
+    np.testing.assert_array_equal(turned, expected)
+    np.testing.assert_array_equal(samples[[0, -1]], before[[0, -1]])
+
+
+@pytest.mark.parametrize("samples", [SAMPLES[:, :5], SAMPLES[:, :1], SAMPLES[:1]])
+def test_two_arrays_are_turned_within_their_memory(samples):
+    u, w = np.cos(samples.T), np.sin(samples.T)
+    expected = w.copy()
+    room, turned = turn_in_place(u, w)
+    room[:] = -1.0
+    np.testing.assert_array_equal(turned, expected)
+    assert np.shares_memory(turned, u)
+    assert np.shares_memory(room, w)
+    assert turned.flags.c_contiguous
+    assert room.flags.c_contiguous
+
+
+OTHERS, ALONE = SAMPLES.copy(), np.cos(SAMPLES[:, :4].T)
+SAME_TIMES = np.broadcast_to(SAMPLES[0], (130, 12)).T
+
+
+@pytest.mark.parametrize(
+    ("u", "w"),
+    [
+        (SAMPLES[:, :4].T, SAMPLES[:, :4].T),  # the same
+        (SAMPLES[:, 4:8].T, SAMPLES[:, :4].T),  # the other way round
+        (SAMPLES[:, :4].T, SAMPLES[:, 2:6].T),  # they overlap
+        (SAMPLES[:, :4].T, SAMPLES[1:, 4:8].T),
+        (SAMPLES[:1, :4].T, SAMPLES[:1, 4:8].T),
+        (SAMPLES[:, :4].T, OTHERS[:, 4:8].T),
+        (ALONE, ALONE),
+        (ALONE.copy(), ALONE.copy()),
+        (ALONE, ALONE[:, ::-1]),
+        (SAME_TIMES[:4], SAME_TIMES[4:8]),
+    ],
+)
+def test_signals_that_lie_in_another_way_are_left_as_they_are(u, w):
+    before = u.copy(), w.copy(), SAMPLES.copy()
+    assert turn_in_place(u, w) is None
+    for array, copy in zip((u, w, SAMPLES), before, strict=True):
+        np.testing.assert_array_equal(array, copy)
