@@ -104,9 +104,14 @@ def _is_header(cells: list[str]) -> bool:
 
 
 def _numbers(names: list[str]) -> list[int]:
-    """Return whole numbers as they are, and other names numbered as they first appear."""
-    if all(re.fullmatch(r"\d+", name) for name in names):
-        return list(map(int, names))
+    """Return whole numbers as they are, and names numbered as they first appear."""
+    if all(map(_is_number, names)):
+        for name in names:
+            if not (float(name) >= 0.0 and float(name).is_integer()):
+                raise BadInput(f"node {name}: nodes are whole numbers from 0, or names")
+        found = [int(float(name)) for name in names]
+        interchange.numbered(max(found))
+        return found
     place: dict[str, int] = {}
     return [place.setdefault(name, len(place)) for name in names]
 

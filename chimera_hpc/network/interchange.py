@@ -15,6 +15,8 @@ from chimera_hpc.network.generators import Parts
 if TYPE_CHECKING:
     from chimera_hpc.network.complex import SimplicialComplex
 
+MOST_NUMBERED = 10**7
+"""Most nodes of a list of links that does not say how many there are: more are likely names."""
 # Attributes of networkx graphs that keep what an undirected graph does not.
 ORIENTATION, PLACE, GROUP, TRIANGLES = "orientation", "link", "group", "triangles"
 
@@ -30,8 +32,18 @@ def from_edges(
         array, weights = array[:, :2], array[:, 2]
     if n_nodes is None:
         numbers = array.dtype.kind in "iuf" and array.ndim == 2 and len(array) > 0
-        n_nodes = int(np.nanmax(array)) + 1 if numbers else 1
+        n_nodes = numbered(int(np.nanmax(array))) if numbers else 1
     return {"n_nodes": n_nodes, "links": array, "weights": weights, "directed": directed}
+
+
+def numbered(largest: int) -> int:
+    """Return the number of nodes of a list of links, by the largest number in it."""
+    if largest >= MOST_NUMBERED:
+        raise BadInput(
+            f"node {largest}: nodes count from 0, up to {MOST_NUMBERED - 1}; number those that "
+            "there are, or give n_nodes"
+        )
+    return largest + 1
 
 
 def from_networkx(graph: Any, weight: str, group: str, directed: bool | None) -> Parts:
@@ -213,6 +225,8 @@ def _sparse(what: str, matrix: Any) -> Any:
     """Return a matrix, dense or sparse, as a COO array of floats without zeros."""
     from scipy.sparse import coo_array
 
+    if np.iscomplexobj(matrix):
+        raise BadInput(f"{what} holds complex numbers: weights must be real")
     try:
         found = coo_array(matrix, dtype=np.float64)
     except (TypeError, ValueError) as error:

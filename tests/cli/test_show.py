@@ -57,7 +57,9 @@ def test_replayed_signals_are_those_of_the_store(store: Store):
     chosen = [oscillating(store), 0]
     for run in replay(store, chosen):
         assert run.u.at(slice(None)).tobytes() == store.series(run.point).tobytes()
-        assert run.u[2:4].tobytes() == store.node_series(run.point)[2:4].tobytes()
+        kept, some = store.node_series(run.point), np.array([3, 1])
+        assert run.u[2:4].tobytes() == kept[2:4].tobytes()
+        assert kept.in_memory()[some].tobytes() == run.u[0:4][some].tobytes()
         assert run.is_same
         assert run.begins
         assert run.is_whole
@@ -75,6 +77,8 @@ def test_large_points_are_computed_one_by_one_and_only_their_last_w_is_kept(
         assert one.u[0:12].tobytes() == other.u[0:12].tobytes()
         assert one.w.tobytes() == other.w[-7:].tobytes()
         assert one.digest == other.digest
+    focused = replay(store, [1, 0], focus=0)
+    assert [run.w.shape for run in focused] == [(0, 12), (7, 12)]
 
 
 def test_other_bits_than_stored_are_said_with_status_one(

@@ -321,6 +321,8 @@ MULTI = networkx.MultiGraph([(0, 1), (0, 1)])
             "weight of the edge 0 - 1 is 'x': not a number",
         ),
         (lambda: Network.from_networkx(networkx.Graph()), "n_nodes = 0: allowed are whole"),
+        (lambda: BY_MATRICES(adjacency=[[0, 1j], [1j, 0]]), "adjacency holds complex numbers"),
+        (lambda: Network.from_edges([(0, 10**9)]), "node 1000000000: nodes count from 0"),
     ],
 )
 def test_what_is_no_network_is_refused_in_one_line(
@@ -356,6 +358,29 @@ def test_names_may_hold_blanks_and_json_need_not_say_what_it_is(
 def test_list_without_links_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text)
     assert refusal(lambda: Network.from_file(tmp_path / "a.csv")).endswith("holds no links")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0,-1\n", "node -1: nodes are whole numbers"),
+        ("0,1.5\n", "node 1.5: nodes are whole numbers"),
+        ("0,nan\n", "node nan: nodes are whole numbers"),
+        ("0,4000000000\n", "node 4000000000: nodes count from 0, up to 9999999"),
+        ("0,99999999999999999999\n", "node 100000000000000000000: nodes count from 0"),
+    ],
+)
+def test_numbers_that_no_node_has_are_not_taken_for_names(
+    text: str, message: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    assert message in refusal(lambda: Network.from_file(tmp_path / "a.csv"))
+
+
+def test_whole_numbers_may_be_written_as_floats(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.txt", [[2, 1], [1, 0]])
+    links = Network.from_file(tmp_path / "a.txt").links
+    np.testing.assert_array_equal(links, [[2, 1], [1, 0]])
 
 
 @given(st.text(alphabet="01, \n;#ab.-", max_size=40))
