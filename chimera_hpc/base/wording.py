@@ -16,6 +16,11 @@ def short(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def number_of(n: int, what: str) -> str:
+    """Return a count with its noun: ``1 node``, ``3 nodes``."""
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
 def nearest(name: str, known: list[str]) -> str:
     """Return '; did you mean X?' or, without a similar name, '; known: X, Y, Z'."""
     near = get_close_matches(name[:60], known, n=1)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from chimera_hpc.base.wording import number_of
+
 Array = NDArray[np.float64]
 
 _JUMP = 1.5
@@ -34,7 +36,7 @@ class Gap:
     def text(self, names: tuple[str, ...]) -> str:
         """Say it on one line."""
         who = "all nodes" if self.node is None else called(names[self.node])
-        count = "1 sample" if self.samples == 1 else f"{self.samples} samples"
+        count = number_of(self.samples, "sample")
         return f"{who}: {count} missing between {self.first:.6g} and {self.last:.6g}"
 
 

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
+from chimera_hpc.base.wording import number_of
 from chimera_hpc.classify import tree
 from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.job import Sweep
@@ -160,8 +161,8 @@ def measure(
     """
     n_nodes, least = made.u.shape[1], 3 if ring else 2
     if n_nodes < least and pairs is None:
-        what = "1 node" if n_nodes == 1 else f"{n_nodes} nodes"
-        raise BadInput(f"{what}: a {'ring' if ring else 'chain'} has at least {least}")
+        what = "ring" if ring else "chain"
+        raise BadInput(f"{number_of(n_nodes, 'node')}: a {what} has at least {least}")
     limit, warnings = _steady_below(made.u, settings.steady_threshold, judge, absolute)
     features = features_of(made, settings, limit)
     triplet = total_variations(features, ring=ring, pairs=pairs)

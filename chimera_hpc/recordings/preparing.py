@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from chimera_hpc.base.errors import BadInput
+from chimera_hpc.base.wording import number_of
 from chimera_hpc.recordings.columns import listed, places, screened, some_of, suspects
 from chimera_hpc.recordings.gaps import Gap, find_gaps, longest_stretch, nearby
 from chimera_hpc.recordings.recording import Recording
@@ -148,10 +149,9 @@ def prepare(
     notes, warned = list(recording.notes), list(recording.warnings)
     if gaps:
         values, times = int(np.isnan(u).sum()), sum(g.samples for g in gaps if g.node is None)
-        counts = {"values": values, "times": times}
-        what = " and ".join(f"{n} {name}" for name, n in counts.items() if n)
-        many = "1 gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
-        warned.append(f"{what} missing, in {many}")
+        counts = {"value": values, "time": times}
+        what = " and ".join(number_of(n, name) for name, n in counts.items() if n)
+        warned.append(f"{what} missing, in {number_of(len(gaps), 'gap')}")
     if part.stop - part.start < 3:
         raise BadInput(f"no stretch without gaps of more than {bridge} samples (--bridge)")
     if part.stop - part.start < len(t):

@@ -29,8 +29,9 @@ _HEAD = 200
 _SAMPLE = 1000
 """Lines of numbers whose digits are looked at."""
 _MOST = 0.9
-_MISSING = ["", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "#n/a",
-            "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!"]  # fmt: skip
+_MISSING = ["", "nan", "na", "n/a", "null", "none", ".", "-", "--", "---", "<na>", "inf", "-inf",
+            "+inf", "#n/a", "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!", "#name?",
+            "#nv", "#wert!", "#zahl!", "#bezug!"]  # fmt: skip
 _COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
 
@@ -73,7 +74,7 @@ def read_table(path: Path, choice: Choice) -> Recording:
         t, how, said = _times(_on_day(columns, time, day), every[time])
         notes += [note if day is None else f"times: columns {every[day]} and {every[time]}", *how]
     else:
-        notes.append("every column is a node")
+        notes.append("no column of times")
     u = np.column_stack([columns[i] for i in nodes])
     called = tuple(every[i] or "index" for i in nodes) if names else ()
     made = Recording(t, u, called, tuple(notes), tuple(said))

@@ -21,6 +21,7 @@ from chimera_hpc import __version__
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.files import write_atomically
 from chimera_hpc.base.status import Status
+from chimera_hpc.base.wording import number_of
 from chimera_hpc.plot.style import SIGNALS, signal_label
 from chimera_hpc.reduction.agreement_text import (
     CAPTION,
@@ -229,9 +230,9 @@ def _words(content: Content, shown: Shown, pictures: str) -> dict[str, str]:
     return {
         "title": _title(content),
         "grid": "; ".join(f"{name}: {_range(labels)}" for name, labels in axis_labels(content)),
-        "size": f"{_some(counts['total'], 'point')} in {_some(n_cells, 'cell')}, "
-        f"{_some(seeds, 'seed')}",
-        "failed": _some(counts["failed"], "point"),
+        "size": f"{number_of(counts['total'], 'point')} in {number_of(n_cells, 'cell')}, "
+        f"{number_of(seeds, 'seed')}",
+        "failed": number_of(counts["failed"], "point"),
         "coverage": f"{tried} of {counts['total']} points tried "
         f"({100 * tried / max(1, counts['total']):.1f} %)",
         "map": f"{n_shown} of {n_cells} cells are on the map, spread evenly."
@@ -269,10 +270,6 @@ def _judge(content: Content) -> str:
     return f"Cells are decided by the {judge}, which is not there (yet); " + (
         "the map shows the classes of the tree of all runs."
     )
-
-
-def _some(n: int, what: str) -> str:
-    return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
 def _range(labels: list[str]) -> str:

@@ -141,11 +141,14 @@ def test_steps_of_a_solver_are_resampled_and_no_gaps(tmp_path: Path):
     assert any("uneven times" in note for note in made.notes)
 
 
-def test_cell_with_a_hash_is_missing_and_cuts_nothing(tmp_path: Path):
+def test_words_for_what_is_missing_are_read_and_cut_nothing(tmp_path: Path):
     text = table(TIMES, ["time", *NAMES]).splitlines()
-    text[700] = ",".join([TIMES[699], "#N/A", *text[700].split(",")[2:]])
+    words = ("#N/A", "#NV", "#WERT!", "---", "-", ".", "<NA>", "null")
+    for i, word in enumerate(words, start=700):
+        text[i] = ",".join([TIMES[i - 1], word, *text[i].split(",")[2:]])
     (tmp_path / "u.csv").write_text("\n".join(text))
-    assert np.isnan(read_recording(tmp_path / "u.csv", Choice()).u).sum() == 1
+    missing = np.isnan(read_recording(tmp_path / "u.csv", Choice()).u)
+    assert np.argwhere(missing).tolist() == [[i, 0] for i in range(699, 699 + len(words))]
 
 
 def read_times(times: list[str], name: str, tmp_path: Path) -> Recording:
