@@ -32,6 +32,8 @@ _MOST = 0.9
 _MISSING = ["", "nan", "na", "n/a", "null", "none", ".", "-", "--", "---", "<na>", "inf", "-inf",
             "+inf", "#n/a", "#na", "#num!", "#div/0!", "#value!", "#ref!", "#null!", "#name?",
             "#nv", "#wert!", "#zahl!", "#bezug!"]  # fmt: skip
+_FORTRAN = re.compile(r"(?<!\w)([-+]?\d*[.,]\d*)[dD]([-+]\d+)(?!\w)")
+"""A number in double precision as Fortran writes it: 1.5D+00."""
 _COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
 
@@ -65,8 +67,7 @@ def read_table(path: Path, choice: Choice) -> Recording:
         elif time is not None and (TIME.search(every[i]) or is_date(values)):
             notes.append(f"column {every[i]} is left out: the times are column {every[time]}")
         else:
-            raise BadInput(f"column {every[i]}: {_word(values)!r} is not a number; --drop leaves "
-                           "columns out")  # fmt: skip
+            raise BadInput(f"column {every[i]}: {_no_number(values, every[i])}")
     if not nodes:
         raise BadInput("has no column of signals")
     t, said = None, list[str]()
@@ -86,6 +87,8 @@ def _lines(path: Path) -> list[str]:
     found = [line for line in lines if line.strip(" ;,\t") and not line.lstrip().startswith("#")]
     if not found:
         raise BadInput("is empty")
+    if _FORTRAN.search(found[-1]):
+        found = [_FORTRAN.sub(r"\1E\2", line) for line in found]
     return found
 
 
@@ -321,5 +324,10 @@ def _clock(cell: str) -> bool:
     return bool(re.match(r"\d+[-:./]\d+", cell.strip()))
 
 
-def _word(values: Any) -> str:
-    return next((str(x) for x in values.dropna() if not _number(str(x))), "")
+def _no_number(values: Any, name: str) -> str:
+    """Say which cell of a column is not a number, and what to do."""
+    words = ((i, str(x)) for i, x in values.dropna().items() if not _number(str(x)))
+    i, word = next(words, (0, ""))
+    again = "the line of names again? save each table to its own file"
+    hint = again if word.strip() == name else "--drop leaves columns out"
+    return f"{word!r} (sample {i}, from 0) is not a number; {hint}"

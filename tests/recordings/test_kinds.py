@@ -151,6 +151,26 @@ def test_words_for_what_is_missing_are_read_and_cut_nothing(tmp_path: Path):
     assert np.argwhere(missing).tolist() == [[i, 0] for i in range(699, 699 + len(words))]
 
 
+def test_exponents_of_fortran_are_read(tmp_path: Path):
+    rows = [f"{i / 50:14.6E}{i % 7 / 3:14.6E}{-i % 5:14.6E}" for i in range(9)]
+    (tmp_path / "u.dat").write_text("\n".join(["t a1d-2 b", *rows]).replace("E", "D"))
+    read = read_recording(tmp_path / "u.dat", Choice())
+    assert read.names == ("a1d-2", "b")
+    np.testing.assert_allclose(read.u[:, 0], [i % 7 / 3 for i in range(9)], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cell", "said"),
+    [("b", "column b: 'b' (sample 4, from 0) is not a number; the line of names again? save each"),
+     ("x1", "column b: 'x1' (sample 4, from 0) is not a number; --drop leaves columns out")],
+)  # fmt: skip
+def test_a_word_among_numbers_is_named_with_its_sample(cell: str, said: str, tmp_path: Path):
+    rows = [f"{i},{i % 7},{cell if i == 4 else i % 5}" for i in range(9)]
+    (tmp_path / "u.csv").write_text("\n".join(["t,a,b", *rows]))
+    with pytest.raises(BadInput, match=re.escape(said)):
+        read_recording(tmp_path / "u.csv", Choice())
+
+
 def read_times(times: list[str], name: str, tmp_path: Path) -> Recording:
     rows = [f"{t};{i % 7};{i * i % 5}" for i, t in enumerate(times)]
     (tmp_path / "u.csv").write_text("\n".join([f"{name};a;b", *rows]))
