@@ -330,4 +330,4 @@ def _no_number(values: Any, name: str) -> str:
     i, word = next(words, (0, ""))
     again = "the line of names again? save each table to its own file"
     hint = again if word.strip() == name else "--drop leaves columns out"
-    return f"{word!r} (sample {i}, from 0) is not a number; {hint}"
+    return f"{word!r} is not a number (sample {i}, from 0); {hint}"

@@ -161,8 +161,8 @@ def test_exponents_of_fortran_are_read(tmp_path: Path):
 
 @pytest.mark.parametrize(
     ("cell", "said"),
-    [("b", "column b: 'b' (sample 4, from 0) is not a number; the line of names again? save each"),
-     ("x1", "column b: 'x1' (sample 4, from 0) is not a number; --drop leaves columns out")],
+    [("b", "column b: 'b' is not a number (sample 4, from 0); the line of names again? save each"),
+     ("x1", "column b: 'x1' is not a number (sample 4, from 0); --drop leaves columns out")],
 )  # fmt: skip
 def test_a_word_among_numbers_is_named_with_its_sample(cell: str, said: str, tmp_path: Path):
     rows = [f"{i},{i % 7},{cell if i == 4 else i % 5}" for i in range(9)]
