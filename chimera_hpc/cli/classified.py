@@ -172,6 +172,8 @@ def table(made: Collection, judge: Judge | None) -> Iterator[str]:
     for one in made.files:
         for warning in (*one.made.warnings, *one.found.warnings):
             yield f"warning: {one.path}: {warning}"
+    for warning in made.warnings:
+        yield f"warning: {warning}"
     yield made.sentence if judge is None else f"classes of {judge.path}"
 
 
@@ -197,6 +199,7 @@ def report_all(
         "atlas": None if judge is None else str(judge.path),
         "classes": {name: made.names.count(name) for name in sorted(set(filter(None, made.names)))},
         "sentence": made.sentence or None,
+        "warnings": list(made.warnings),
         "figures": [str(file) for file in files],
     }
 

@@ -115,7 +115,6 @@ def _answer(args: Namespace) -> list[str]:
 
     if args.preset is not None:
         choice("--preset", args.preset, tuple(PRESETS))
-    paths = recording_files(args.files)
     judge = None if args.atlas is None else Judge.load(args.atlas, args.preset)
     settings = _settings(args.overrides, judge, args.preset)
     keys = [text.partition("=")[0].strip().removeprefix("features.") for text in args.overrides]
@@ -132,13 +131,15 @@ def _answer(args: Namespace) -> list[str]:
         links=args.links,
         absolute=not {"still", "steady_threshold"}.isdisjoint(keys),
     )
-    if paths == args.files and len(paths) == 1 and args.clusters is None:
-        one = measure_file(paths[0], how, settings, judge)
+    dropped = [] if args.drop is None else [Path(args.drop)]
+    sources = recording_files(args.files, [*how.files, *dropped])
+    if sources.files == args.files and len(args.files) == 1 and args.clusters is None:
+        one = measure_file(args.files[0], how, settings, judge)
         files = [] if args.no_figures else draw(args.out, one, settings, judge)
         if args.json:
             return [json.dumps(report(one, how, judge, files), allow_nan=False)]
         return [*lines(one, how, judge), *_written(files)]
-    made = measure_files(paths, how, settings, judge, args.clusters or "auto")
+    made = measure_files(sources, how, settings, judge, args.clusters or "auto")
     files = [] if args.no_figures else draw_sheet(args.out, made)
     if args.json:
         return [json.dumps(report_all(made, how, judge, files), allow_nan=False)]

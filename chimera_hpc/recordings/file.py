@@ -45,6 +45,11 @@ class Treatment:
     absolute: bool = False
     """Whether the user sets ``steady_threshold``, in the unit of the signal."""
 
+    @property
+    def files(self) -> list[Path]:
+        """Files that say how recordings are treated: links, and the order if it is in a file."""
+        return [Path(name) for name in (self.links, self.order) if name is not None]
+
     def pairs(self, n_nodes: int) -> NDArray[np.int64] | None:
         """Return the pairs (M, 2) over which variations are taken; None for ring and chain."""
         if self.links is None:

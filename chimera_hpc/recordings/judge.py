@@ -46,7 +46,7 @@ _BLOCKS = 20
 _MAXIMA = 1.02
 """Maxima a turn of the clock beyond which some are put down to noise."""
 _ALIKE = 3.0
-"""Factor between frequencies from which units of time are taken for different."""
+"""Factor between frequencies or amplitudes from which units are taken for different."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +60,10 @@ class Judge:
     frequency: float
     """Median over runs and nodes."""
     amplitude: float
+    nodes: int | None = None
+    """Of each run; None for signals on links or triangles."""
+    pairs: str = "ring"
+    """Over which variations were taken: "ring", "links" or "order"."""
 
     @classmethod
     def load(cls, path: Path, preset: str | None = None) -> Judge:
@@ -73,8 +77,10 @@ class Judge:
         atlas = load_atlas(folder, convention)
         if not atlas.names:
             raise BadInput(f"{folder}: no run of this sweep oscillates: it has no classes")
-        frequency, amplitude = _typical(store)
-        return cls(folder, atlas, store.sweep.integrator.t_step, settings, frequency, amplitude)
+        sweep, typical = store.sweep, _typical(store)
+        nodes = sweep.n_nodes if sweep.signals == "nodes" else None
+        step = sweep.integrator.t_step
+        return cls(folder, atlas, step, settings, *typical, nodes=nodes, pairs=sweep.pairs)
 
 
 def _measured_by(folder: Path, sweep: Sweep, preset: str | None) -> tuple[Features, str]:
@@ -183,6 +189,7 @@ def measure(
     if judge is not None and np.isfinite(triplet).all():
         verdict = verdict_of(judge.atlas, np.array(triplet))
         warnings += _unlike(features, judge) if features.status is Status.DONE else []
+        warnings += _other_pairs(n_nodes, pairs is not None, judge)
     return Measured(features, triplet, samples, verdict, tuple(warnings))
 
 
@@ -310,15 +317,30 @@ def _poor(made: Prepared, settings: Features, features: NodeFeatures) -> list[st
 
 
 def _unlike(features: NodeFeatures, judge: Judge) -> list[str]:
-    """Return a line where the recording's unit of time seems to be another one."""
-    frequency = float(np.median(features.frequency))
-    ratio = max(frequency, 1e-300) / judge.frequency
-    if 1.0 / _ALIKE < ratio < _ALIKE:
-        return []
+    """Return a line for each unit of the recording, of time or signal, that seems another one."""
+    units = (
+        ("frequency", features.frequency, judge.frequency, "V_Omega has the unit of frequency"),
+        ("amplitude", features.amplitude, judge.amplitude, "V_a has the unit of the signal"),
+    )
     return [
-        f"the median frequency is {frequency:.3g}, that of the atlas's runs {judge.frequency:.3g}: "
-        "V_Omega has the unit of frequency and V_a that of the signal; --factors or --rescale"
+        f"the median {name} is {np.median(values):.3g}, that of the atlas's runs {typical:.3g}: "
+        f"{what}; --factors or --rescale"
+        for name, values, typical, what in units
+        if not 1.0 / _ALIKE < max(float(np.median(values)), 1e-300) / typical < _ALIKE
     ]
+
+
+def _other_pairs(n_nodes: int, network: bool, judge: Judge) -> list[str]:
+    """Return lines where the atlas's runs have other neighbours, or another number of nodes."""
+    lines = []
+    if network != (judge.pairs == "links"):
+        theirs = "links of a network" if judge.pairs == "links" else "neighbours on a ring"
+        how = "--links FILE gives them" if judge.pairs == "links" else "leave --links out"
+        lines.append(f"the variations of the atlas's runs were taken over {theirs}: {how}")
+    if judge.nodes is not None and judge.nodes != n_nodes:
+        lines.append(f"{n_nodes} nodes, but the atlas's runs have {judge.nodes}: along a smooth "
+                     "state, neighbours differ less the more nodes there are")  # fmt: skip
+    return lines
 
 
 def _typical(store: Store) -> tuple[float, float]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import glob
+import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from chimera_hpc.classify import tree
 from chimera_hpc.classify.class_number import class_number, far_from_others, silhouettes
 from chimera_hpc.job.tables import Features
 from chimera_hpc.measures.conventions import preset_settings
+from chimera_hpc.recordings.alike import copies, differences
+from chimera_hpc.recordings.columns import some_of
 from chimera_hpc.recordings.file import Recorded, Treatment, measure_file
 from chimera_hpc.recordings.judge import Judge
 from chimera_hpc.recordings.read import is_zarr, known_ending
@@ -32,33 +35,57 @@ the amplitude and of the frequency: what varies less is noise, and makes no clas
 QUANTITIES = ("V_theta", "V_a", "V_Omega", "frequency", "amplitude", "samples_per_period")
 
 
-def recording_files(words: Sequence[str | Path]) -> list[Path]:
+class Sources(NamedTuple):
+    """Files of recordings, and a line for each folder of which others were left out."""
+
+    files: list[Path]
+    left_out: list[str]
+
+
+def recording_files(words: Sequence[str | Path], but: Sequence[Path] = ()) -> Sources:
     """Return the files that words name: files, folders of files, and patterns such as ``*.csv``.
 
     Files of a folder come in the order of their names, those that begin with a dot are left out.
-    A folder that is a Zarr store is a recording. Raises BadInput for a word that names no file.
+    A folder that is a Zarr store is a recording. A file that two words name comes once; those of
+    `but`, files that other options name, come only if a word is their path. Raises BadInput for a
+    word that names no file.
     """
-    found: dict[Path, None] = {}
+    found: dict[str, Path] = {}
+    left_out = []
+    options = {os.path.abspath(path) for path in but}
     for word in words:
-        path = Path(word)
-        if path.is_dir() and not is_zarr(path):
-            files = list(_files_in(path))
-            if not files:
-                raise BadInput(f"{path}: no recording in this folder")
-        elif glob.has_magic(str(word)) and not path.exists():
-            files = [Path(name) for name in sorted(glob.glob(str(word), recursive=True))]
-            if not files:
-                raise BadInput(f"{word}: no file matches")
-        else:
-            files = [path]
-        found |= dict.fromkeys(files)
-    return list(found)
+        files, left = _named_by(word)
+        if files != [Path(word)]:
+            left += [path for path in files if os.path.abspath(path) in options]
+            files = [path for path in files if path not in left]
+        if not files:
+            raise BadInput(f"{word}: no recording in this folder{_deeper(word)}")
+        if left:
+            names = sorted(path.name for path in left)
+            left_out.append(f"{word}: {some_of(names, 'file')} left out: no recordings")
+        for path in files:
+            found.setdefault(os.path.abspath(path), path)
+    return Sources(list(found.values()), left_out)
 
 
-def _files_in(folder: Path) -> Iterator[Path]:
-    for path in sorted(folder.iterdir()):
-        if not path.name.startswith(".") and (known_ending(path) or is_zarr(path)):
-            yield path
+def _named_by(word: str | Path) -> tuple[list[Path], list[Path]]:
+    """Return the files of one word, and those of its folder whose names are not of recordings."""
+    path = Path(word)
+    if path.is_dir() and not is_zarr(path):
+        seen = [one for one in sorted(path.iterdir()) if not one.name.startswith(".")]
+        files = [one for one in seen if (is_zarr if one.is_dir() else known_ending)(one)]
+        return files, [one for one in seen if one not in files and not one.is_dir()]
+    if glob.has_magic(str(word)) and not path.exists():
+        files = [Path(name) for name in sorted(glob.glob(str(word), recursive=True))]
+        if not files:
+            raise BadInput(f"{word}: no file matches")
+        return files, []
+    return [path], []
+
+
+def _deeper(word: str | Path) -> str:
+    inner = Path(word).is_dir() and any(one.is_dir() for one in Path(word).iterdir())
+    return f"; '{word}/*/*' names those in its folders" if inner else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +100,8 @@ class Collection:
     single cluster and for a recording without a class."""
     sentence: str
     """How many classes there are, in words; empty with an atlas."""
+    warnings: tuple[str, ...] = ()
+    """What speaks against the comparison, and which files of folders were left out; a line each."""
 
     @property
     def triplets(self) -> NDArray[np.float64]:
@@ -81,7 +110,7 @@ class Collection:
 
 
 def measure_files(
-    paths: Sequence[Path],
+    sources: Sources,
     how: Treatment,
     settings: Features,
     judge: Judge | None,
@@ -91,9 +120,24 @@ def measure_files(
 
     Raises BadInput, which begins with the path of the first file that cannot be measured.
     """
-    files = tuple(measure_file(path, how, settings, judge) for path in paths)
-    if judge is None:
-        return _clustered(files, clusters)
+    files = tuple(_measured(sources.files, how, settings, judge))
+    made = _judged(files) if judge is not None else _clustered(files, clusters)
+    doubts = [] if judge is not None else differences(files)
+    return replace(made, warnings=(*sources.left_out, *copies(files), *doubts))
+
+
+def _measured(
+    paths: Sequence[Path], how: Treatment, settings: Features, judge: Judge | None
+) -> Iterator[Recorded]:
+    for number, path in enumerate(paths, start=1):
+        try:
+            yield measure_file(path, how, settings, judge)
+        except BadInput as error:
+            where = f" (file {number} of {len(paths)}; none is classified)"
+            raise BadInput(f"{error}{where if len(paths) > 1 else ''}") from None
+
+
+def _judged(files: tuple[Recorded, ...]) -> Collection:
     verdicts = [one.found.verdict for one in files]
     names = tuple(one.found.name for one in files)
     sure = [np.nan if verdict is None else verdict.confidence for verdict in verdicts]
@@ -170,7 +214,8 @@ def classify_recordings(
         ``value(recording, quantity)`` with the quantities V_theta, V_a, V_Omega, frequency and
         amplitude (medians over the nodes), samples_per_period; ``class(recording)``, empty for
         none, ``confidence(recording)`` and ``status(recording)``; the files along `recording`. The
-        attribute `sentence` says how many classes there are.
+        attribute `sentence` says how many classes there are, `warnings` what speaks against the
+        comparison: copies, other numbers of nodes, other units, files of a folder left out.
 
     Raises
     ------
@@ -186,7 +231,8 @@ def classify_recordings(
         by_preset = Features.model_validate({"preset": preset or "default"})
         settings = by_preset if judge is None else judge.settings
     how = Treatment(links=None if links is None else Path(links), **treatment)
-    return as_dataset(measure_files(recording_files(words), how, settings, judge, clusters))
+    sources = recording_files(words, how.files)
+    return as_dataset(measure_files(sources, how, settings, judge, clusters))
 
 
 def as_dataset(made: Collection) -> xr.Dataset:
@@ -203,7 +249,7 @@ def as_dataset(made: Collection) -> xr.Dataset:
             "status": ("recording", np.array(status)),
         },
         coords={"recording": files, "quantity": list(QUANTITIES)},
-        attrs={"sentence": made.sentence},
+        attrs={"sentence": made.sentence, "warnings": list(made.warnings)},
     )
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.recordings.columns import without
+from chimera_hpc.recordings.columns import some_of, without
 from chimera_hpc.recordings.dates import DATED, of_numbers
 from chimera_hpc.recordings.recording import TIME, Choice, Recording, as_signals, as_times, turned
 from chimera_hpc.recordings.tables import read_table
@@ -58,6 +58,8 @@ def _reader(path: Path) -> Reader:
         return _read_zarr
     if not path.exists():
         raise BadInput("no such file")
+    if not path.is_file():  # reading one may never end
+        raise BadInput("a pipe or a device, no file: save its data first")
     if not known_ending(path):
         sheet = "save the sheet as CSV; " if _ending(path) in _SHEETS else ""
         raise BadInput(
@@ -176,13 +178,17 @@ def _read_edf(path: Path, choice: Choice) -> Recording:
         raise BadInput("has no signal")
     rate = max(signal.sampling_frequency for signal in signals)
     kept = [signal for signal in signals if signal.sampling_frequency == rate]
-    notes = [f"{rate:g} samples per second, by the file"]
+    notes, said = (f"{rate:g} samples per second, by the file",), []
     if len(kept) < len(signals):
-        notes.append(f"{len(signals) - len(kept)} signals with fewer samples per second left out")
+        slow = [signal.label for signal in signals if signal.sampling_frequency != rate]
+        said.append(f"{some_of(slow, 'signal')}: fewer samples per second, left out")
+    units = list(dict.fromkeys(signal.physical_dimension for signal in kept))
+    if len(units) > 1:
+        said.append(f"signals have different units: {', '.join(unit or 'none' for unit in units)}")
     u = as_signals("signals", np.stack([signal.data for signal in kept], axis=1))
     t = np.arange(len(u), dtype=np.float64) / rate
     names = tuple(signal.label for signal in kept)
-    return Recording(None if choice.no_times else t, u, names, tuple(notes))
+    return Recording(None if choice.no_times else t, u, names, notes, tuple(said))
 
 
 def _arrays(shapes: dict[str, Any], choice: Choice) -> Recording:

@@ -137,6 +137,19 @@ def test_recording_outside_the_atlas_has_no_class_but_a_nearest(
     assert inside["class"] == inside["nearest"]
 
 
+def test_what_the_atlas_has_otherwise_is_said(recorded: tuple[Path, Store, int], sweep: Sweep):
+    folder, store, i = recorded
+    t, u = sample_times(store.sweep), store.series(i)
+    np.savez("part.npz", t=t, u=0.1 * u[:, :5])
+    np.savetxt("links.csv", [[k, (k + 1) % 5] for k in range(5)], delimiter=",", fmt="%d")
+    network, nodes, amplitude = "over neighbours on a ring: leave", "5 nodes, but", "median amplit"
+    for words, said in (((), [amplitude, nodes]), (("--links", "links.csv"), [network])):
+        warned = as_json(sweep, "part.npz", "--atlas", folder, *words)["warnings"]
+        assert all(any(part in line for line in warned) for part in said), warned
+    inside = as_json(sweep, folder, "--select", f"point={i}", "--atlas", folder)["warnings"]
+    assert not any(part in line for line in inside for part in (network, nodes, amplitude))
+
+
 def test_rescaling_takes_other_units_back(recorded: tuple[Path, Store, int], sweep: Sweep):
     folder, store, i = recorded
     t, u = sample_times(store.sweep), store.series(i)

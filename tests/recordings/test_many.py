@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from chimera_hpc import classify_recordings
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.classify.agreement import adjusted_rand
+from chimera_hpc.recordings import Choice, read_recording
 from chimera_hpc.recordings.many import recording_files
 from chimera_hpc.sweep import main
 
@@ -113,11 +115,53 @@ def test_files_are_found_in_folders_and_by_patterns(tmp_path: Path) -> None:
     files = write(tmp_path / "a", [0, 1])
     (tmp_path / "a" / ".hidden.npz").touch()
     (tmp_path / "a" / "notes.md").touch()
-    assert recording_files([tmp_path / "a"]) == files
-    assert recording_files([f"{tmp_path}/a/*-1.npz", files[1], files[0]]) == [files[1], files[0]]
-    for word, said in ((f"{tmp_path}/*.csv", "no file matches"), (tmp_path, "no recording in")):
+    left = [f"{tmp_path / 'a'}: file notes.md left out: no recordings"]
+    assert recording_files([tmp_path / "a"]) == (files, left)
+    again = tmp_path / "b" / ".." / "a" / files[0].name
+    words = [f"{tmp_path}/a/*-1.npz", files[1], files[0], again]
+    assert recording_files(words) == ([files[1], files[0]], [])
+    links = tmp_path / "a" / "ring.csv"
+    links.touch()
+    for word in (tmp_path / "a", f"{tmp_path}/a/*[0-9g].*"):
+        found = recording_files([word], [links])
+        assert found.files == files
+        assert "ring.csv left out" in found.left_out[0]
+    assert recording_files([links], [links]).files == [links]
+    deeper = r"no recording in this folder; '.*/\*/\*' names those in its folders"
+    for wrong, said in ((f"{tmp_path}/*.csv", "no file matches"), (tmp_path, deeper)):
         with pytest.raises(BadInput, match=said):
-            recording_files([word])
+            recording_files([wrong])
+
+
+def test_what_speaks_against_a_comparison_is_said(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    u, few = kind_of_ring(1, rng), kind_of_ring(1, rng, 6)
+    saved = {"a": (T, u), "b": (T, u), "c": (T, few), "d": (1e3 * T, 1e-3 * u[:, ::-1])}
+    saved |= {"e": (T, 0 * u), "f": (T, 0 * u)}
+    for name, (t, signals) in saved.items():
+        np.savez(tmp_path / f"{name}.npz", t=t, u=signals)
+    (tmp_path / "notes.md").touch()
+    a, b, c, d = (str(tmp_path / f"{name}.npz") for name in "abcd")
+    left, copy, nodes, frequency, amplitude = classify_recordings(tmp_path).warnings
+    assert left == f"{tmp_path}: file notes.md left out: no recordings"
+    assert copy == f"{b}: the same values as {a}; it counts twice"
+    assert nodes.startswith(f"6 ({c}) to 16 nodes ({a}): along a smooth state, neighbours differ")
+    assert f"({d}) to " in frequency
+    assert frequency.endswith("V_Omega has the unit of frequency; classify files of each unit "
+                              "by themselves")  # fmt: skip
+    assert amplitude.startswith("median amplitude of 0.00")
+    assert f" ({d}) to 0.9" in amplitude or f" ({d}) to 1" in amplitude
+    assert classify_recordings([a, tmp_path / "e.npz", tmp_path / "f.npz"]).warnings == []
+
+
+def test_one_file_of_many_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    write(tmp_path, [0, 1])
+    (tmp_path / "000-junk.csv").write_text("a note, no numbers\n")
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(BadInput, match=r"pipe.csv: a pipe or a device, no file"):
+        classify_recordings(tmp_path / "pipe.csv")
+    with pytest.raises(BadInput, match=r"-junk.csv: has no line .* \(file 2 of 4; none is class"):
+        classify_recordings(tmp_path)
 
 
 @pytest.mark.slow
@@ -178,6 +222,22 @@ def as_edf(edfio: object, file: Path, u: Array) -> None:
         for i, column in enumerate(u.T)
     ]
     edfio.Edf(signals).write(file)  # type: ignore[attr-defined]
+
+
+def test_signals_of_an_edf_file_that_differ_are_said(tmp_path: Path) -> None:
+    edfio = pytest.importorskip("edfio")
+    u = kind_of_ring(1, np.random.default_rng(0), 4)
+    signals = [
+        edfio.EdfSignal(column, 50, label=f"ch{i}", physical_dimension="uV" if i else "mV")
+        for i, column in enumerate(u.T)
+    ]
+    edfio.Edf([*signals, edfio.EdfSignal(u[::5, 0], 10, label="breath")]).write(tmp_path / "a.edf")
+    made = read_recording(tmp_path / "a.edf", Choice())
+    assert made.names == ("ch0", "ch1", "ch2", "ch3")
+    assert made.warnings == (
+        "signal breath: fewer samples per second, left out",
+        "signals have different units: mV, uV",
+    )
 
 
 def as_bdf(edfio: object, file: Path, u: Array) -> None:

@@ -133,7 +133,8 @@ def _judges(given: AnalysisInput) -> dict[str, list[str | None]]:
 def _classes(given: AnalysisInput) -> list[str]:
     """Return the classes that have a curve: chimera, or all if none is called so."""
     found = {str(name) for names in _judges(given).values() for name in names if name}
-    if given.atlases or any(_is([name], "chimera")[0] for name in found):
+    known = found.union(*(atlas.names for atlas in given.atlases.values()))
+    if any(_is([name], "chimera")[0] for name in known):
         return ["chimera"]
     return sorted(found - {STEADY, NO_WINDOW})
 
@@ -153,7 +154,7 @@ def _curves(
         curve = fraction_curve(x, _is(verdicts, wanted)[among], counted)
         others = {
             other: fraction_curve(x, _is(verdicts, other)[among], counted).fraction
-            for other in ("ordered", "disordered", STEADY)
+            for other in (("ordered", "disordered", STEADY) if wanted == "chimera" else (STEADY,))
         }
         curves[name] = {
             **curve.to_dict(),
