@@ -29,7 +29,7 @@ from chimera_hpc.reduction.quality import poor_classes, quality_warnings
 from chimera_hpc.reduction.record import decided_variables, reduction_variables
 from chimera_hpc.reduction.results import TRIPLET, build_results, json_safe, to_json
 from chimera_hpc.reduction.selection import check_selections
-from chimera_hpc.reduction.stability import one_state, tree_warnings
+from chimera_hpc.reduction.stability import counted, tree_warnings
 from chimera_hpc.reduction.table import DECIDED, class_table
 from chimera_hpc.run.rounds import Standing
 from chimera_hpc.store.labelled import STORE_NAME
@@ -169,7 +169,7 @@ class _Work:
         measured = quality_warnings(store.sweep, self.status, self.scalars, self.quality, made.cuts)
         self.results["warnings"] = [
             *overridden(store.sweep.features),
-            *one_state(self.triplets, made),
+            *counted(self.triplets, made),
             *measured,
             *tree_warnings(made),
         ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chimera_hpc.classify.class_number import class_number
 from chimera_hpc.classify.classification import Classification
 from chimera_hpc.classify.classifiers import AGGLOMERATIVE
+from chimera_hpc.classify.naming import CLASSES
 from chimera_hpc.classify.tree import relative_gap
 
 CLOSE_MERGES = 0.02
@@ -17,7 +18,7 @@ CLOSE_MERGES = 0.02
 
 
 ENOUGH = 30
-"""Runs from which it is said that they look like one state."""
+"""Runs from which it is said how many classes they look like."""
 
 
 def tree_warnings(made: Classification) -> list[str]:
@@ -25,16 +26,22 @@ def tree_warnings(made: Classification) -> list[str]:
     return [*_of_sample(made), *_of_cuts(made)]
 
 
-def one_state(triplets: NDArray[np.float64], made: Classification) -> list[str]:
-    """Return a line if the runs look like one state, which any cut parts nevertheless.
+def counted(triplets: NDArray[np.float64], made: Classification) -> list[str]:
+    """Return a line if the runs look like one state, or like another number than all cuts have.
 
-    Of fewer than `ENOUGH` runs, nothing is said.
+    The latter is said of neutral classes only: the paper's three have names of their own. Of fewer
+    than `ENOUGH` runs, nothing is said.
     """
     clustered = made.base.labels >= 0
     if np.count_nonzero(clustered) < ENOUGH:
         return []
     found = class_number(triplets[clustered])
-    return [f"{found.sentence}: the classes are parts of one cloud"] if found.answer == 1 else []
+    if found.answer == 1:
+        return [f"{found.sentence}: the classes are parts of one cloud"]
+    sizes = {len(cut.names) for cut in made.cuts.values()}
+    if found.answer in sizes or set(made.base.families) & set(CLASSES):
+        return []
+    return [f"{found.sentence}, and no cut has so many: add {found.answer} to reduction.cuts"]
 
 
 def runs_with_class(made: Classification) -> int:
