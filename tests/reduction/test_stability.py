@@ -7,7 +7,7 @@ import pytest
 
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import LARGEST_TREE, Classification, classify
-from chimera_hpc.reduction.stability import tree_warnings
+from chimera_hpc.reduction.stability import counted, tree_warnings
 
 
 def of_line(
@@ -44,3 +44,20 @@ def test_nothing_to_warn_of_without_runs() -> None:
 
 def test_hundred_thousand_runs_are_in_one_tree() -> None:
     assert LARGEST_TREE["ward"] == 100_000
+
+
+@pytest.mark.parametrize(
+    ("cuts", "names", "said"),
+    [((3, 4), "letters", True), ((2, 3), "letters", False), ((3,), "triplet", False)],
+)
+def test_a_number_of_classes_that_no_cut_has_is_said(
+    cuts: tuple[int, ...], names: str, said: bool
+) -> None:
+    rng = np.random.default_rng(0)
+    triplets = np.repeat([0.0, 1.0], 20)[:, None] + 0.05 * rng.normal(size=(40, 3))
+    made = classify(triplets, np.full(40, int(Status.DONE)), cuts=cuts, names=names)
+    lines = counted(triplets, made)
+    assert len(lines) == said
+    for line in lines:
+        assert line.startswith("40 of 40 runs look like 2 classes (")
+        assert line.endswith(", and no cut has so many: add 2 to reduction.cuts")
