@@ -29,9 +29,10 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
     Triplets, SI (first of ``reduction.deltas``), sigma_1, and those of `classify.verdicts.RULES`
     whose numbers the store has. Steady runs count as ordered, except by SI and sigma_1, which have
     values for them. ``pairs`` has the confusion matrix of the runs, Cohen's kappa over runs and
-    over cells, and the adjusted Rand index of the runs; ``differing`` lists the cells whose modal classes are not all equal. Where triplets and sigma_1
-    have names of their own (`reduction.names`), kappa is not defined for them, and cells are
-    compared without them; the adjusted Rand index needs no names.
+    over cells, and the adjusted Rand index of the runs; ``differing`` lists the cells whose modal
+    classes are not all equal. Where triplets and sigma_1 have names of their own
+    (`reduction.names`), kappa is not defined for them, and cells are compared without them; the
+    adjusted Rand index needs no names.
     """
     given.need_runs()
     methods, rules = _methods(given)
