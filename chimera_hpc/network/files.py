@@ -165,14 +165,14 @@ def _npz(path: Path, directed: bool | None) -> Parts:
 def _mtx(path: Path, directed: bool | None) -> Parts:
     from scipy.io import mmread
 
-    return _matrices({"adjacency": mmread(path)}, directed)
+    return _matrices({"adjacency": mmread(path, spmatrix=False)}, directed)
 
 
 def _mat(path: Path, directed: bool | None) -> Parts:
     from scipy.io import loadmat
 
     try:
-        arrays = loadmat(path)
+        arrays = loadmat(path, spmatrix=False)
     except NotImplementedError:
         raise BadInput('is a MATLAB file of version 7.3: save it with "-v7"') from None
     named = {name: value for name, value in arrays.items() if not name.startswith("__")}

@@ -1,6 +1,6 @@
 """Links of standard networks; `Network` has a maker for each, with its documentation.
 
-Every function returns the parts of a network by name. networkx draws the random ones that it has.
+Every function returns the parts of a network by name. networkx draws two of the random ones.
 """
 
 from __future__ import annotations
@@ -99,15 +99,44 @@ def random(n: int, mean_degree: float, seed: Seed) -> Parts:
 
 def modular(sizes: Sequence[int], p_in: float, p_out: float, seed: Seed) -> Parts:
     """Return groups of nodes with a link within them with p_in, between them with p_out."""
-    from networkx import random_partition_graph
-
     if not len(sizes) or min(sizes) < 1:
         raise BadInput(f"sizes = {list(sizes)}: every group has at least one node")
     _share("p_in", p_in)
     _share("p_out", p_out)
     _few(sum(map(float, sizes)) ** 2 / 2.0 * max(p_in, p_out))
-    graph = random_partition_graph(list(map(int, sizes)), p_in, p_out, seed=_python_random(seed))
-    return {**_parts(graph), "groups": np.repeat(np.arange(len(sizes)), sizes)}
+    rng, starts = generator(seed), np.cumsum([0, *sizes])
+    links = [_within(n, p_in, rng) + start for n, start in zip(sizes, starts[:-1], strict=True)]
+    for a, b in combinations(range(len(sizes)), 2):
+        tail, head = np.divmod(_chosen(sizes[a] * sizes[b], p_out, rng), sizes[b])
+        links.append(np.column_stack([starts[a] + tail, starts[b] + head]))
+    found = np.concatenate(links)
+    return {
+        "n_nodes": int(starts[-1]),
+        "links": found[np.lexsort(found.T[::-1])],
+        "groups": np.repeat(np.arange(len(sizes)), sizes),
+    }
+
+
+def _within(n: int, p: float, rng: np.random.Generator) -> Integers:
+    """Return the pairs of n nodes that are chosen, each with probability p."""
+    row = np.cumsum(np.arange(n)[::-1])  # pairs up to the last one of each tail
+    chosen = _chosen(n * (n - 1) // 2, p, rng)
+    tail = np.searchsorted(row, chosen, side="right")
+    return np.column_stack([tail, chosen - row[tail] + n]) if n > 1 else np.empty((0, 2), np.int64)
+
+
+def _chosen(count: int, p: float, rng: np.random.Generator) -> Integers:
+    """Return which of so many are chosen, each with probability p, in time of those that are."""
+    if p in (0.0, 1.0):
+        return np.arange(count if p else 0)
+    at, found = -1, []
+    while at < count:
+        # The distance from one to the next has a geometric distribution.
+        skips = np.floor(np.log1p(-rng.random(1000)) / np.log1p(-p))
+        found.append(at + np.cumsum(1 + np.minimum(skips, count).astype(np.int64)))
+        at = int(found[-1][-1])
+    every = np.concatenate(found) if found else np.empty(0, np.int64)
+    return every[every < count]
 
 
 def two_populations(n: int, A: float) -> Parts:

@@ -115,7 +115,7 @@ def _read_mat(path: Path, choice: Choice) -> Recording:
     from scipy.io.matlab import MatReadError
 
     try:
-        arrays = _flat(loadmat(path, simplify_cells=True))
+        arrays = _flat(loadmat(path, simplify_cells=True, spmatrix=False))
     except NotImplementedError:
         arrays = _read_mat73(path)
     except (MatReadError, ValueError, TypeError, IndexError, KeyError) as error:

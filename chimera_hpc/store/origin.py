@@ -39,8 +39,8 @@ def stored_origin(path: Path, root: Mapping[str, Any]) -> Origin:
 def _table(spec: Mapping[str, Any], nodes: Mapping[str, Any]) -> ModelParameters | None:
     """Return the table of parameters; None where a column is none of the job's keys."""
     columns = [n for n in nodes["ledger"]["attributes"]["coordinates"].split() if n in nodes]
-    keys = {*spec["fixed"], *spec["grid"]}
-    if not keys.issuperset({*columns} - {"seed", "delta"}):
+    keys = [*spec["fixed"], *spec["grid"]]
+    if not {*keys}.issuperset({*columns} - {"seed", "delta"}):
         return None
     # A parameter that came with a later version of the model has no column of its own.
     names = dict.fromkeys((*columns, *keys))

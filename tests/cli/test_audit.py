@@ -47,6 +47,7 @@ def test_the_same_audit_twice_is_the_same_and_leaves_the_store_alone(
     assert stored_bytes(finished) == before
 
 
+@pytest.mark.slow
 def test_processes_find_what_one_does(finished: Path) -> None:
     chosen = np.array([0, 6, 7, 13])
     path = finished / "store.zarr"
@@ -225,6 +226,7 @@ def test_ctrl_c_leaves_results_as_they_were(
     assert not list(finished.glob(".*.partial"))
 
 
+@pytest.mark.slow
 def test_a_sweep_that_does_not_measure_the_distance_is_audited(
     job: Path, tmp_path: Path, sweep: Run
 ) -> None:

@@ -163,6 +163,7 @@ def test_results_hold_chains_and_their_thresholds(serial, tmp_path):
     assert [axes.get_title() for axes in figure.axes[:2]] == ["P = 2", "P = 3"]
 
 
+@pytest.mark.slow
 def test_an_extension_adds_whole_chains(serial, tmp_path, capsys):
     job, out = write_job(tmp_path, grid__P=[3]), tmp_path / "out"
     assert run(job, out, "--cluster", "serial") == 0
@@ -205,6 +206,7 @@ def test_points_behind_a_failed_one_are_not_started_until_it_is_done(tmp_path, c
     assert (digests[0] == digests[1]).all()
 
 
+@pytest.mark.slow
 def test_first_states_come_from_a_file(tmp_path):
     sizes = {"u": 12, "v": 24}
     rng = np.random.default_rng(1)

@@ -131,6 +131,7 @@ def test_status_and_plan_tell_rounds_and_runs(decided, sweep: Run, tmp_path):
     assert f"expected about {decide['runs']}" in out
 
 
+@pytest.mark.slow
 def test_shares_do_the_rounds_together(decided, sweep: Run, tmp_path):
     for index in (1, 0):
         words = ("--of", "2", "--index", index, "--out", tmp_path / "sweep")
@@ -149,6 +150,7 @@ def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
     assert results(tmp_path / "sweep")["decide"] == results(decided / "sweep")["decide"]
 
 
+@pytest.mark.slow
 def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
     job = ("run", decided / "job.toml", "--cluster", "serial", "--no-figures")
     few = ("Q=0", "decide.first=2", "decide.batch=2", "decide.most=4", "decide.refine={}")

@@ -76,6 +76,7 @@ def test_share_of_an_array_fails_when_a_block_was_put_aside(
     assert sweep(*words, 1)[0] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["run", "shard"])
 def test_points_that_were_added_during_a_run_are_pending(
     command: str, job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch

@@ -81,6 +81,7 @@ def test_large_points_are_computed_one_by_one_and_only_their_last_w_is_kept(
     assert [run.w.shape for run in focused] == [(0, 12), (7, 12)]
 
 
+@pytest.mark.slow
 def test_other_bits_than_stored_are_said_with_status_one(
     finished: Path, store: Store, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
 ):

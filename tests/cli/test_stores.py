@@ -190,6 +190,7 @@ def test_extend_adds_points_and_touches_no_finished_one(
     assert "0 points added" in out
 
 
+@pytest.mark.slow
 def test_extended_sweep_has_the_digests_of_one_planned_so(
     job: Path, finished: Path, tmp_path: Path, sweep: Run
 ) -> None:
@@ -307,6 +308,7 @@ def test_merge_takes_a_result_where_the_other_store_has_a_failure(
     assert digests(tmp_path / "all")[3, 2] == digests(parts[1])[3, 2]
 
 
+@pytest.mark.slow
 def test_merge_refuses_sweeps_that_differ_in_more_than_axes(
     job: Path, finished: Path, tmp_path: Path, sweep: Run
 ) -> None:

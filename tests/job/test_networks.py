@@ -199,6 +199,7 @@ def test_the_digest_of_a_sweep_follows_the_content_of_the_file_alone(tmp_path: P
     assert stored.n_nodes == 6
 
 
+@pytest.mark.slow
 def test_a_block_of_points_runs_on_networks() -> None:
     sweep = Sweep.from_dict(
         job(

@@ -149,6 +149,7 @@ def test_phase_lag_decides_between_order_and_disorder_through_the_whole_pipeline
     assert (v_theta[~order] > 0.2).all()
 
 
+@pytest.mark.slow
 def test_rayleigh_job_runs_through_the_whole_pipeline(tmp_path: Path) -> None:
     settings = ["grid.sigma=[0.2, 0.4]", "grid.P=[5]", "seeds=2", "n_nodes=20"]
     settings += ["integrator.t_end=200", "features.start=100", "features.n_peaks=6"]

@@ -53,6 +53,7 @@ def test_points_are_models_on_their_networks(name):
     assert models[0].lane_group == models[1].lane_group != models[2].lane_group
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["kuramoto_sakaguchi", "stuart_landau"])
 def test_points_run(name):
     job = sweep(name, omega=6.0, coupling=0.2)

@@ -65,6 +65,7 @@ def test_oscillators_follow_the_reduced_equations():
     np.testing.assert_allclose(r, exact.y[0], rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_two_thousand_oscillators_keep_the_order_of_the_stable_chimera():
     n, (r, psi) = 1000, CHIMERA[0.2]
     rng = np.random.default_rng(8)

@@ -222,6 +222,7 @@ def test_packages_that_a_model_imports_are_recorded_with_their_versions(tmp_path
     assert packages == {"numpy": np.__version__, "scipy": scipy.__version__}
 
 
+@pytest.mark.slow
 def test_changed_weights_are_said_and_strictly_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -245,6 +246,7 @@ def test_changed_weights_are_said_and_strictly_refused(
     assert "warning: run 1 had other mine_code.W: float64 (6,) " in found.out + found.err
 
 
+@pytest.mark.slow
 def test_a_store_is_read_without_its_module(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -357,6 +359,7 @@ def test_a_series_that_does_not_fit_ends_the_run(
     assert series.max() == pytest.approx(5.0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_store_of_int16_goes_on_where_the_job_says_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

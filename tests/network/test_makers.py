@@ -85,6 +85,17 @@ def test_modular_networks_are_denser_within_their_groups() -> None:
         assert abs(count - share * pairs) < 5 * np.sqrt(pairs * share * (1 - share))
 
 
+def test_each_pair_of_a_modular_network_is_linked_with_its_probability() -> None:
+    count = np.zeros((5, 5))
+    for seed in range(500):
+        tail, head = Network.modular([3, 2], 0.6, 0.2, seed).links.T
+        count[tail, head] += 1
+    expected = 500 * np.array([[0.6] * 3 + [0.2] * 2] * 3 + [[0.0] * 3 + [0.6] * 2] * 2)
+    i, j = np.triu_indices(5, 1)
+    assert (np.abs(count - expected)[i, j] < 5 * np.sqrt(500 * 0.25)).all()
+    assert count[j, i].sum() == 0
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -109,7 +120,7 @@ def test_random_networks_are_the_same_in_every_version() -> None:
     assert [network.digest for network in found] == DIGESTS
 
 
-DIGESTS = ["f5f796f78b96674e", "afe77aca24710c78", "c156f07806a681c8", "4bc97b1311e65334"]
+DIGESTS = ["f5f796f78b96674e", "afe77aca24710c78", "c156f07806a681c8", "ddcc8fd1464ac5da"]
 
 
 def test_two_populations_have_the_weights_of_the_literature() -> None:

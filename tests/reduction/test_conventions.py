@@ -133,6 +133,7 @@ def test_recordings_are_judged_under_the_second_convention(both: Path, tmp_path:
         Judge.load(alone, "paper-printed")
 
 
+@pytest.mark.slow
 def test_recordings_are_not_judged_by_default_under_the_second_convention(tmp_path: Path) -> None:
     printed = run(tmp_path / "a", "features.preset=paper-printed")
     with pytest.raises(BadInput, match=r'\[features\] preset = "default" is needed$'):

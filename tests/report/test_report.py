@@ -82,6 +82,7 @@ def test_summary_tells_sweep_counts_and_versions(tmp_path, filled):
     assert "Not finished" not in words
 
 
+@pytest.mark.slow
 def test_votes_and_classes_are_those_of_the_results(tmp_path, filled):
     filled(tmp_path, *PLANE, steady=[0, 1, 5])
     reduce_sweep(tmp_path)
@@ -178,6 +179,7 @@ def test_failures_are_listed_with_reason_and_command(tmp_path, filled):
     assert "1 point failed." in words
 
 
+@pytest.mark.slow
 def test_long_list_of_failures_is_cut(tmp_path, filled):
     filled(tmp_path, FAST, "seeds=80", "P=3:5", failed=range(240))
     words = words_of(page_of(tmp_path))

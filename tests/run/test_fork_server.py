@@ -91,6 +91,7 @@ def test_forked_worker_has_all_imports_and_the_environment_of_a_spawned_one() ->
         assert found["blocked"] == []
 
 
+@pytest.mark.slow
 @linux
 def test_temporary_folder_with_a_long_name_is_no_obstacle(tmp_path: Path) -> None:
     folder = tmp_path / ("x" * 90)
@@ -109,6 +110,7 @@ print(start_fork_server(), get_temp_dir().startswith(tempfile.gettempdir()))"""
     assert done.stdout.split() == ["forkserver", "False"]
 
 
+@pytest.mark.slow
 def test_commands_that_need_no_workers_start_none(
     job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

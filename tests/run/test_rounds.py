@@ -145,6 +145,7 @@ def test_refined_boundaries_enclose_the_thresholds(whole):
         assert high - low <= 0.02 * (2 if undecided else 1) + 1e-12
 
 
+@pytest.mark.slow
 def test_the_points_do_not_depend_on_the_order_of_the_work(whole, tmp_path):
     store = Store.plan(tmp_path / "store.zarr", whole.sweeps[0])
     while True:
@@ -160,6 +161,7 @@ def test_the_points_do_not_depend_on_the_order_of_the_work(whole, tmp_path):
     assert same(store, whole)
 
 
+@pytest.mark.slow
 def test_extended_and_merged_stores_go_on_with_their_rounds(whole, tmp_path):
     job = Sweep.from_toml_text(JOB, ["P=[3]"])
     other = finish(Store.plan(tmp_path / "other.zarr", job))
@@ -175,6 +177,7 @@ def test_extended_and_merged_stores_go_on_with_their_rounds(whole, tmp_path):
     assert (now.found.decided | (now.runs == 20)).all()
 
 
+@pytest.mark.slow
 def test_killed_at_any_moment_the_points_and_digests_are_the_same(whole, tmp_path):
     store = Store.plan(tmp_path / "store.zarr", whole.sweeps[0])
     chance = random.Random(4)

@@ -111,6 +111,7 @@ def test_point_that_never_returns_has_timed_out_and_the_others_go_on(
     assert "nothing to compute" in command("run", job, "--out", tmp_path / "out").stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["initial", "rhs"])
 def test_model_that_hangs_in_its_first_point_is_told_on_one_line(
     job: Path, tmp_path: Path, what: str

@@ -105,7 +105,8 @@ def test_one_node_and_a_stretch_of_time_are_read_without_the_rest(
     for times, nodes in ((slice(None), slice(7, 8)), (slice(40, 60), slice(None))):
         Counting.bytes = 0
         assert np.asarray(array[0, times, nodes]).size
-        assert 0 < Counting.bytes < size / 6
+        # Zarr from 3.4 on reads pieces that are near each other at once.
+        assert 0 < Counting.bytes < size / 3
 
 
 class Counting(zarr.storage.LocalStore):

@@ -63,6 +63,7 @@ print("read")
 """
 
 
+@pytest.mark.slow
 def test_others_read_it_with_xarray_and_without_a_warning(tmp_path: Path) -> None:
     store = make_store(tmp_path)
     store.write_block(1, block_results(store, 1), store.start_run({}), 1)
@@ -171,6 +172,7 @@ def test_series_are_kept_as_asked(
         assert not {"scale_factor", "_FillValue"} & set(attributes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keep", ["all", "none", "first-seed"])
 def test_files_and_room_are_what_plan_says(tmp_path: Path, keep: str) -> None:
     store = fill(make_store(tmp_path, f"keep.series={keep}", "seeds=40", "run.block=3"))
