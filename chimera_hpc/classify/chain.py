@@ -14,8 +14,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from chimera_hpc.integrate.jit import jit
-
 Floats = NDArray[np.float64]
 
 
@@ -28,43 +26,45 @@ def ward(points: Floats) -> Floats:
     return _number(sorted(_merges(points), key=lambda merge: merge[2]))
 
 
-@jit()
-def nearest(
-    centroids: Floats, weights: Floats, n_clusters: int, one: int, bound: float
-) -> tuple[int, float]:
-    """Return the cluster nearest to `one` and its distance, or (-1, bound) if none is nearer.
-
-    The distance, ``|x - y|^2 / (1/s + 1/t)``, has the same bits from either side.
-    """
-    found = -1
-    for other in range(n_clusters):
-        weight = weights[one] + weights[other]
-        square = 0.0
-        for axis in range(centroids.shape[1]):
-            square += (centroids[one, axis] - centroids[other, axis]) ** 2
-        if other != one and square < bound * weight and square / weight < bound:
-            found, bound = other, square / weight
-    return found, bound
-
-
 class _Clusters:
     """The remaining clusters in contiguous arrays: centroids, weights and one leaf of each."""
 
     def __init__(self, points: Floats) -> None:
-        self.centroids = np.array(points, dtype=np.float64, order="C")
+        self.centroids = np.array(points.T, dtype=np.float64, order="C")
+        """(n_columns, m)"""
         self.weights = np.ones(len(points))
         """One over the number of points."""
         self.leaves = np.arange(len(points))
         self.n = len(points)
+        self._steps = np.empty_like(self.centroids)
+        self._distances, self._sums = np.empty((2, self.n))
+
+    def nearest(self, one: int, bound: float) -> tuple[int, float]:
+        """Return the cluster nearest to `one` and its distance, or (-1, bound) if none is nearer.
+
+        The distance, ``|x - y|^2 / (1/s + 1/t)``, has the same bits from either side.
+        """
+        n = self.n
+        steps, found, sums = self._steps[:, :n], self._distances[:n], self._sums[:n]
+        np.subtract(self.centroids[:, :n], self.centroids[:, one : one + 1], out=steps)
+        np.multiply(steps, steps, out=steps)
+        np.add.reduce(steps, axis=0, out=found)
+        np.add(self.weights[:n], self.weights[one], out=sums)
+        np.divide(found, sums, out=found)
+        found[one] = np.inf
+        other = int(found.argmin())
+        distance = float(found[other])
+        return (other, distance) if distance < bound else (-1, bound)
 
     def merge(self, one: int, other: int) -> None:
         """Replace `one` by the union and `other` by the last cluster."""
         share = self.weights[one] / (self.weights[one] + self.weights[other])
         # Equal centroids stay equal to the last bit.
-        self.centroids[one] += share * (self.centroids[other] - self.centroids[one])
+        centroids = self.centroids
+        centroids[:, one] += share * (centroids[:, other] - centroids[:, one])
         self.weights[one] *= 1.0 - share
         self.n -= 1
-        self.centroids[other] = self.centroids[self.n]
+        centroids[:, other] = centroids[:, self.n]
         self.weights[other] = self.weights[self.n]
         self.leaves[other] = self.leaves[self.n]
 
@@ -74,9 +74,7 @@ def _merges(points: Floats) -> Iterator[tuple[int, int, float]]:
     clusters = _Clusters(points)
     chain, reach = [0], [np.inf]
     while clusters.n > 1:
-        following, distance = nearest(
-            clusters.centroids, clusters.weights, clusters.n, chain[-1], reach[-1]
-        )
+        following, distance = clusters.nearest(chain[-1], reach[-1])
         if following >= 0:
             chain.append(following)
             reach.append(distance)

@@ -7,6 +7,7 @@ j their posterior is Dirichlet(n_1 + 1, ..., n_k + 1), and the probability that 
 
 I the regularised incomplete beta function: p_m / (p_m + p_j) is Beta(n_m + 1, n_j + 1). The lead is
 this bound; for two classes it is exact. Five equal votes of three classes have a lead of 0.969.
+Where only one class is known, a second one counts that no run has shown: no vote decides alone.
 
 As in the modal class, runs that do not oscillate have a vote only where none does; the lead is then
 one over all classes, since a run that oscillates would alter the modal class.
@@ -82,6 +83,7 @@ def leads(votes: Integers, leader: Integers) -> Floats:
     a = voting(votes) + 1.0
     mine = np.take_along_axis(a, np.maximum(leader, 0)[:, None], axis=1)
     behind = np.where(rivals, betainc(mine, a, 0.5), 0.0).sum(axis=1)
+    behind += np.where(rivals.any(axis=1), 0.0, betainc(mine[:, 0], 1.0, 0.5))
     return np.where(leader >= 0, np.maximum(0.0, 1.0 - behind), 0.0)
 
 

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.cluster import hierarchy
 from scipy.spatial.distance import pdist
 
+from chimera_hpc.classify import chain
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -52,9 +54,6 @@ def grow(scaled: Floats, method: Linkage) -> Floats:
     if len(scaled) < 2:
         return np.empty((0, 4))
     if method == "ward" and len(scaled) > MOST_BY_SCIPY:
-        # Imported here: it loads numba.
-        from chimera_hpc.classify import chain
-
         return chain.ward(scaled)
     # Distances are passed, because SciPy may take a square array of points for distances.
     return np.asarray(hierarchy.linkage(pdist(scaled), method=method), dtype=np.float64)

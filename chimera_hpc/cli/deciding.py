@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from chimera_hpc.job import Sweep
+from chimera_hpc.job.decide import is_single
 
 
 def decide_state(path: Path, metadata: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -56,8 +57,9 @@ def plan_line(sweep: Sweep, store: Path) -> str:
     """
     decide = sweep.decide
     assert decide is not None
-    grid = sweep.model_copy(update={"added": None})
-    n_cells = len(grid.points()) // decide.first
+    from chimera_hpc.run.rounds import grid_cells
+
+    n_cells = grid_cells(sweep)
     best, worst = n_cells * decide.first, decide.full_grid(sweep.axes, n_cells)
     expected = "unknown before the first round"
     if store.is_dir():
@@ -69,4 +71,10 @@ def plan_line(sweep: Sweep, store: Path) -> str:
             best = max(best, state["runs"])
             if decide.refine:
                 expected += ", and those of cells that refinement adds"
-    return f"decide      at best {best} runs, expected {expected}, at worst {worst}"
+    text = f"decide      at best {best} runs, expected {expected}, at worst {worst}"
+    for name in decide.refine:
+        if is_single(sweep.axes[name]):
+            text += (
+                f"\nwarning: decide.refine.{name}: {name} has one value, so no boundary along it"
+            )
+    return text

@@ -29,7 +29,7 @@ from typing import Any
 from chimera_hpc.base.places import home_folder, is_writable, private_folder
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_KERNEL_FOLDERS = ("integrate", "models", "measures", "classify")
+_KERNEL_FOLDERS = ("integrate", "models", "measures")
 _UNUSED_DAYS = 30
 _KERNEL_BYTES = 32_000_000
 """Room for all kernels, which take 11 MB, and for those that replace them."""

@@ -98,6 +98,11 @@ class Decide(Table):
         return round(n_cells * more) * self.most
 
 
+def is_single(axis: Axis) -> bool:
+    """Return whether an axis has one value, for all values of the others."""
+    return isinstance(axis, Values) and len(as_array(axis)) == 1
+
+
 def _filling(axis: Axis, distance: float) -> float:
     """Return how many times as many values an axis has when it is filled down to a distance."""
     if isinstance(axis, Between):

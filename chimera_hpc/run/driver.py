@@ -137,9 +137,11 @@ class Driver:
     def _check_judge(self) -> None:
         """Raise BadInput, before anything is computed, when the atlas that judges is missing."""
         if self.store.sweep.decide is not None:
-            from chimera_hpc.run.judge import other_judge
+            from chimera_hpc.run.judge import judge_warnings, other_judge
 
             other_judge(self.store)
+            for line in judge_warnings(self.store):
+                self.reporter.say(f"warning: {line}")
 
     def _count(self) -> None:
         """Have the reporter count what the ledger says, by whichever run."""

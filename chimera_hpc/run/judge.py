@@ -33,6 +33,11 @@ def other_judge(store: Store) -> Atlas | None:
     if decide is None or decide.judge != "atlas":
         return None
     place = sibling(store.path.parent, names[0])
+    if place.resolve() == store.path.parent.resolve():
+        raise BadInput(
+            f"decide.judge: atlas {names[0]} is this sweep itself, whose classes change as it goes "
+            "on; leave judge out, or name another sweep"
+        )
     try:
         stored = Store.open(place / STORE_NAME).reduction()
         atlas = Atlas.from_arrays(stored.arrays, stored.attributes)
@@ -41,6 +46,17 @@ def other_judge(store: Store) -> Atlas | None:
     if not atlas.names:
         raise BadInput(f"decide.judge: atlas {names[0]}: {place} has no classes")
     return atlas
+
+
+def judge_warnings(store: Store) -> list[str]:
+    """Return a line where another model's sweep judges."""
+    decide, names = store.sweep.decide, store.sweep.reduction.atlas
+    if decide is None or decide.judge != "atlas":
+        return []
+    model = Store.open(sibling(store.path.parent, names[0]) / STORE_NAME).sweep.model
+    if model == store.sweep.model:
+        return []
+    return [f"decide.judge: atlas {names[0]} is of the model {model}, not {store.sweep.model}"]
 
 
 def frozen_judge(
@@ -64,9 +80,9 @@ def _first_tree(triplets: bytes, status: bytes, spec: Reduction, rule: Rule) -> 
         np.frombuffer(status, dtype=np.int64),
         linkage=spec.linkage,
         classifier=spec.classifier,
-        cuts=spec.cuts,
-        depth=spec.depth,
+        cuts=spec.cuts[:1],
+        depth=None if spec.cuts else spec.depth,
         names=rule,
     )
-    cut = made.cuts[spec.cuts[0]] if spec.cuts else next(iter(made.cuts.values()))
+    cut = next(iter(made.cuts.values()))
     return Atlas.of(made, cut) if cut.names else _ONE_CLASS

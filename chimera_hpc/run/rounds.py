@@ -41,7 +41,7 @@ class Standing:
     """Those that do not follow another axis."""
     cells: Mapping[str, Column]
     n_grid: int
-    """Number of cells of the first round; the others come behind."""
+    """Number of cells of the grid; the others are refined ones, or those of a merged store."""
     runs: NDArray[np.int64]
     judge: Atlas
     """What gives the runs their classes: that of the first round's tree, or another sweep's."""
@@ -120,12 +120,18 @@ def judged(
         axes=axes,
         independent=tuple(n for n in axes if not isinstance(sweep.axes[n], Same)),
         cells=columns,
-        n_grid=int(cell[:n_first].max(initial=-1)) + 1,
+        n_grid=grid_cells(sweep),
         runs=np.bincount(cell, minlength=n_cells),
         judge=judge,
         labels=labels,
         votes=np.pad(table, ((0, 0), (0, missing))),
     )
+
+
+def grid_cells(sweep: Sweep) -> int:
+    """Return the number of cells of the grid of a sweep with [decide], without those added."""
+    assert sweep.decide is not None
+    return len(sweep.model_copy(update={"added": None}).points()) // sweep.decide.first
 
 
 def next_sweep(store: Store) -> Sweep | None:

@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy.cluster import hierarchy
@@ -65,12 +62,3 @@ def test_large_tree_is_grown_by_chains_and_equals_the_small_one(
     monkeypatch.setattr(tree, "MOST_BY_SCIPY", 59)
     monkeypatch.setattr(hierarchy, "linkage", None)
     np.testing.assert_allclose(tree.grow(points, "ward"), small, rtol=1e-12)
-
-
-def test_small_tree_loads_no_numba() -> None:
-    code = (
-        "import sys, numpy as np; from chimera_hpc.classify import tree;"
-        "tree.grow(np.random.default_rng(1).random((50, 3)), 'ward'); print('numba' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"

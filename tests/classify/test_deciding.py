@@ -45,6 +45,13 @@ def test_silent_runs_count_only_where_no_run_has_a_class():
     np.testing.assert_allclose(found.share, [1.0, 0.9, np.nan])
 
 
+def test_of_a_single_class_a_second_one_may_not_have_been_seen():
+    one = np.array([(1, 0, 0), (5, 0, 0), (5, 90, 0)])
+    found = decisions(one, np.array([7]), 0.95)
+    np.testing.assert_allclose(found.lead, [3 / 4, 63 / 64, 63 / 64])
+    assert found.decided.tolist() == [False, True, True]
+
+
 def test_a_tie_is_not_decided():
     assert not decisions(votes((50, 50, 0)), SIZES, 0.6).decided[0]
 

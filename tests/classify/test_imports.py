@@ -7,8 +7,7 @@ SCRIPT = """
 import importlib, pkgutil, sys
 import chimera_hpc.classify
 for module in pkgutil.iter_modules(chimera_hpc.classify.__path__):
-    if module.name != "chain":  # compiled; a large tree alone imports it
-        importlib.import_module(f"chimera_hpc.classify.{module.name}")
+    importlib.import_module(f"chimera_hpc.classify.{module.name}")
 print(*(n for n in ("zarr", "dask", "sklearn", "matplotlib", "numba") if n in sys.modules))
 """
 

@@ -193,6 +193,30 @@ def test_killed_at_any_moment_the_points_and_digests_are_the_same(whole, tmp_pat
     assert same(Store.open(store.path), whole)
 
 
+def test_runs_that_oscillate_after_a_steady_first_round_are_not_overlooked(tmp_path):
+    sweep = Sweep.from_toml_text(JOB, ["decide.refine={}", "decide.confidence=0.999"])
+    store = Store.plan(tmp_path / "store.zarr", sweep)
+    while True:
+        for block in store.pending():
+            rows = store.points_to_do(block)
+            points = store.block(block)[0] + rows
+            made, still = made_up(store, points), results(store, points, Status.STEADY)
+            still.scalars[:] = np.nan
+            first = store.points.columns["seed"][points] < 5
+            for name in ("status", "features", "scalars", "quality"):
+                getattr(made, name)[first] = getattr(still, name)[first]
+            store.write_block(block, made, 1, 1, None, rows)
+        more = next_round(store)
+        if more is None:
+            break
+        store = more
+    now = standing(store)
+    assert now is not None
+    assert now.names[0] == "unclassified"
+    assert (now.found.leader == 0).all()
+    assert (now.runs > 10).all()
+
+
 def test_runs_that_failed_have_no_vote_and_a_cell_of_them_no_more_runs(tmp_path):
     sweep = Sweep.from_toml_text(JOB, ["decide.refine={}"])
     store = Store.plan(tmp_path / "store.zarr", sweep)
