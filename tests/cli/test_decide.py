@@ -129,6 +129,8 @@ def test_status_and_plan_tell_rounds_and_runs(decided, sweep: Run, tmp_path):
     assert "at best 24 runs, expected unknown before the first round, at worst 120" in out
     _, out, _ = sweep("plan", decided / "job.toml", "--out", decided / "sweep")
     assert f"expected about {decide['runs']}" in out
+    _, out, _ = sweep("plan", decided / "job.toml", "--out", tmp_path / "none", "--set", "P=[2]")
+    assert "warning: decide.refine.P: P has one value, so no boundary along it" in out
 
 
 @pytest.mark.slow
@@ -158,6 +160,9 @@ def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
     code, _, err = sweep(*job, *changes, "--out", decided / "lost", "--set", 'atlas="none"')
     assert code == 2
     assert "decide.judge: atlas none: " in err
+    code, _, err = sweep(*job, *changes, "--out", decided / "lost", "--set", 'atlas="lost"')
+    assert code == 2
+    assert "decide.judge: atlas lost is this sweep itself" in err
     lost = Store.open(decided / "lost" / "store.zarr").ledger()["status"]
     assert (lost == Status.NEVER).all()
     code, out, _ = sweep(*job, *changes, "--out", decided / "judged", "--set", 'atlas="sweep"')
@@ -173,7 +178,7 @@ def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
         assert cell["runs"] in (2, 4)
         assert cell["class"] == "steady" or mine.count(cell["class"]) == max(map(mine.count, mine))
     lost_page = report_of(Content.read(decided / "lost"), most_pictures=0, replay=False)
-    assert "decided by the atlas none, which is not there (yet)" in lost_page
+    assert "decided by the atlas lost, which is not there (yet)" in lost_page
     assert "judge" not in data_of(lost_page)["cuts"]
     rows = list(csv.DictReader("".join(table(store)).splitlines()))
     assert [row["class_judge"] or UNCLASSIFIED for row in rows] == named.tolist()
