@@ -112,6 +112,7 @@ def measure_large(folder: Path, tiny: bool = False) -> list[Line]:
         *large.many_points(folder, 40_000 if tiny else 10_000_000),
         *large.estimates(folder, ("P=12",) if tiny else ("P=10:15",)),
         large.fair_share(),
+        large.first_round(folder, 500 if tiny else 10_000),
     ]
 
 

@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from measured import MB, Done, Line, run
 
 if TYPE_CHECKING:
@@ -45,6 +46,19 @@ seeds = 2
 t_end = {end}
 [features]
 start = 50.0
+"""
+ROUNDS = """
+name = "rounds"
+model = "topological_fhn"
+[grid]
+P = "2:11"
+Q = "P"
+epsilon = {{ linspace = [0.01, 0.1, {values}] }}
+[keep]
+series = "none"
+[decide]
+most = 20
+refine = {{ epsilon = 0.0002 }}
 """
 SWEEP = ("-m", "chimera_hpc.sweep")
 
@@ -140,6 +154,33 @@ def long_window(folder: Path, end: float) -> Line:
     run(*SWEEP, "run", folder / "long.toml", "--out", out, "--cluster", "serial", "--no-figures")
     done = run(*SWEEP, "show", out, "P=3", "seed=0")
     return _memory(f"show of {end - 50:g} time units", done, 1000, "3400 MB")
+
+
+def first_round(folder: Path, n_points: int) -> Line:
+    """Return the processor time that a new process takes to decide and to extend a first round."""
+    from nothing import nothing
+
+    from chimera_hpc.job import Sweep
+    from chimera_hpc.store.schema import scalar_labels
+    from chimera_hpc.store.store import Store
+
+    sweep = Sweep.from_toml_text(ROUNDS.format(values=n_points // 50))
+    store, draw = Store.plan(folder / "rounds" / "store.zarr", sweep), np.random.default_rng(0)
+    places = [scalar_labels(sweep).index(name) for name in ("V_theta", "V_a", "V_Omega")]
+    centres = np.array([(0.05, 0.01, 0.001), (0.3, 0.1, 0.11), (0.55, 0.02, 0.01)])
+    for block in range(store.n_blocks):
+        points = store.block_points(block)
+        share = 1 / (1 + np.exp((0.05 - points.columns["epsilon"]) / 0.01))
+        classes = (draw.random((2, len(points))) < [share, share**4]).sum(axis=0)
+        result = nothing(sweep, points)
+        result.scalars[:, places] = centres[classes] * draw.normal(1.0, 0.2, (len(points), 3))
+        store.write_block(block, result, 1, 1)
+    program = "import sys, time; from chimera_hpc.store.store import Store; "
+    program += "from chimera_hpc.run.rounds import next_round; store = Store.open(sys.argv[1]); "
+    program += "began = time.process_time(); assert next_round(store).pending(); "
+    program += "print(time.process_time() - began)"
+    seconds = float(run("-c", program, store.path).text)
+    return Line(f"a first round of {n_points:.0e} points: processor time", seconds, "s", 2)
 
 
 def lazily(store: Store) -> Line:
