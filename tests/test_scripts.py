@@ -76,21 +76,28 @@ def test_unsuitable_python_is_one_line(tmp_path):
     assert errors.startswith("PYTHON=/bin/false: no Python 3.11 to 3.14 was found")
 
 
+def few_commands(folder):
+    """Return a search path without any Python."""
+    commands = folder / "bin"
+    commands.mkdir()
+    for name in ("bash", "dirname"):
+        (commands / name).symlink_to(shutil.which(name))
+    return str(commands)
+
+
 def test_python_without_its_venv_module_is_one_line(tmp_path):
     python = tmp_path / "python3.14"
     python.write_text('#!/bin/sh\n[ "$1" = -V ] && echo Python 3.14.1\n')
     python.chmod(0o755)
-    errors = one_line_error(make_tree(tmp_path / "tree"), PYTHON=str(python))
+    tree, commands = make_tree(tmp_path / "tree"), few_commands(tmp_path)
+    errors = one_line_error(tree, PYTHON=str(python), PATH=commands)
     assert errors.startswith(f"{python} has no module venv or ensurepip")
     assert errors.endswith("apt install python3-venv\n")
 
 
 def test_no_python_is_one_line(tmp_path):
-    commands = tmp_path / "bin"
-    commands.mkdir()
-    for name in ("bash", "dirname"):
-        (commands / name).symlink_to(shutil.which(name))
-    errors = one_line_error(make_tree(tmp_path / "tree"), PYTHON="", PATH=str(commands))
+    tree = make_tree(tmp_path / "tree")
+    errors = one_line_error(tree, PYTHON="", PATH=few_commands(tmp_path))
     assert errors.startswith("no Python 3.11 to 3.14")
 
 
