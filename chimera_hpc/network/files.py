@@ -142,7 +142,11 @@ def _json(path: Path, directed: bool | None) -> Parts:
     if not isinstance(data, dict) or "nodes" not in data:
         raise BadInput('expected is an object with "nodes" and "links" or "edges" (node-link)')
     data.setdefault("multigraph", False)  # as of D3 and others, which do not say
-    return _graph(node_link_graph(data, edges="edges" if "edges" in data else "links"), directed)
+    graph = node_link_graph(data, edges="edges" if "edges" in data else "links")
+    # The package adds nodes that only a link names.
+    if unknown := list(graph)[len(data["nodes"]) :]:
+        raise BadInput(f'node {unknown[0]!r:.60} of a link is not among "nodes"')
+    return _graph(graph, directed)
 
 
 def _graph(graph: Any, directed: bool | None) -> Parts:

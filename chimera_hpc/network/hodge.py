@@ -95,10 +95,16 @@ def mean_of_rows(matrix: csr_array) -> csr_array:
     degree = np.asarray(matrix.sum(axis=1), dtype=np.float64)
     isolated = np.flatnonzero(degree == 0.0)
     if len(isolated):
+        node = int(isolated[0])
         more = f" (and {len(isolated) - 1} more)" if len(isolated) > 1 else ""
+        if matrix[[node]].nnz:
+            fault = f"the weights of node {node}{more} add up to 0"
+        elif matrix[:, [node]].nnz:
+            fault = f"no link leads to node {node}{more}"
+        else:
+            fault = f"node {node}{more} has no links"
         raise BadInput(
-            f"node {isolated[0]}{more} has no links, and coupling is divided by the degree: "
-            "link the node or leave it out"
+            f"{fault}, and coupling is divided by the degree: link the node or leave it out"
         )
     mean = matrix.copy()
     mean.data /= np.repeat(degree, np.diff(mean.indptr))

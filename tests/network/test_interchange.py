@@ -264,6 +264,10 @@ def array_file(name: str, array: Any) -> Callable[[Path], object]:
         (text_file("a.graphml", "<graphml"), "cannot be read as a network: "),
         (text_file("a.gml", "graph ["), "cannot be read as a network: "),
         (text_file("a.json", "[1]"), 'expected is an object with "nodes" and "links"'),
+        (
+            text_file("a.json", '{"nodes":[{"id":0}],"links":[{"source":0,"target":"5"}]}'),
+            "node '5' of a link is not among \"nodes\"",
+        ),
         (text_file("a.json", "{"), "cannot be read as a network: "),
         (text_file("a.npz", "nothing"), "cannot be read as a network: "),
         (text_file("a.mat", "nothing"), "cannot be read as a network: "),

@@ -222,6 +222,14 @@ ARROW = Network(2, [(0, 1)], directed=True)
             "flips = 6: allowed is 0 to the 5 links of",
         ),
         (lambda: Network(3, [(0, 1)]).neighbour_mean, "node 2 has no links, and coupling is div"),
+        (
+            lambda: Network(3, [(0, 1), (1, 2)], [1.0, -1.0]).neighbour_mean,
+            "the weights of node 1 add up to 0, and coupling is div",
+        ),
+        (
+            lambda: Network(3, [(0, 1), (1, 2)], directed=True).neighbour_mean,
+            "no link leads to node 0, and coupling is div",
+        ),
         (lambda: ARROW.laplacian(0), "a directed network has no orientation, which a boundary"),
         (lambda: ARROW.divergence, "a directed network has no orientation"),
         (
