@@ -95,7 +95,8 @@ def execute(args: Namespace) -> int:
     with redirect_stdout(sys.stderr):
         answer = _answer(args)
     for line in answer:
-        print(line)
+        # Names of files may hold bytes that are no text, and ends of lines.
+        print(line.encode("utf-8", "backslashreplace").decode("utf-8").replace("\n", "\\n"))
     return Exit.COMPLETE
 
 

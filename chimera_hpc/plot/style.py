@@ -168,8 +168,11 @@ def name_nodes(axis: Axis, names: Sequence[str], **look: Any) -> None:
 
 
 def plain(text: str) -> str:
-    """Escape the dollar signs of a text, so that they do not begin a formula."""
-    return text.replace("$", r"\$")
+    """Escape the dollar signs of a text, so that they do not begin a formula, and what no font has.
+
+    Names of files may hold bytes that are no text.
+    """
+    return text.encode("utf-8", "replace").decode("utf-8").replace("$", r"\$")
 
 
 def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:

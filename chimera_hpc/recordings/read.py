@@ -6,8 +6,10 @@ loads no pickled object, whoever made the file.
 
 from __future__ import annotations
 
+import struct
 import warnings
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,9 @@ Reader = Callable[[Path, Choice], Recording]
 _TIMES = ("t", "time", "times")
 _SIGNALS = ("u", "x", "y", "data", "signal", "signals")
 _SHEETS = (".xls", ".xlsx", ".xlsm", ".ods", ".numbers")
+_BROKEN = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, AssertionError,
+           RuntimeError, MemoryError, struct.error)  # fmt: skip
+"""What libraries raise for files that are damaged or of another kind."""
 _ZARR = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
 
 
@@ -47,7 +52,7 @@ def read_recording(path: Path, choice: Choice) -> Recording:
         return made if reader is read_table else without(made, choice.drop)
     except BadInput as error:
         raise BadInput(f"{path}: {error}") from None
-    except (OSError, EOFError, UnicodeDecodeError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, UnicodeDecodeError, zipfile.BadZipFile, zlib.error) as error:
         raise BadInput(f"{path}: can't be read: {_line(error)}") from None
 
 
@@ -118,7 +123,7 @@ def _read_mat(path: Path, choice: Choice) -> Recording:
         arrays = _flat(loadmat(path, simplify_cells=True, spmatrix=False))
     except NotImplementedError:
         arrays = _read_mat73(path)
-    except (MatReadError, ValueError, TypeError, IndexError, KeyError) as error:
+    except (*_BROKEN, MatReadError) as error:
         raise BadInput(f"can't be read as a MATLAB file: {_line(error)}") from None
     plain = {name: array for name, array in arrays.items() if not name.startswith("_")}
     return _arrays({k: a for k, a in plain.items() if a.dtype.kind in "iufc"}, choice)
@@ -146,12 +151,15 @@ def _hdf5_arrays(path: Path, kind: str) -> dict[str, Any]:
         import h5py
     except ImportError:
         raise _needs("h5py", kind) from None
-    with h5py.File(path) as file:
-        names: list[str] = []
-        file.visit(names.append)
-        arrays = {name: file[name] for name in names if not name.startswith("#")}
-        return {k.replace("/", "."): np.asarray(a) for k, a in arrays.items()
-                if isinstance(a, h5py.Dataset) and a.dtype.kind in "iufc"}  # fmt: skip
+    try:
+        with h5py.File(path) as file:
+            names: list[str] = []
+            file.visit(names.append)
+            arrays = {name: file[name] for name in names if not name.startswith("#")}
+            return {k.replace("/", "."): np.asarray(a) for k, a in arrays.items()
+                    if isinstance(a, h5py.Dataset) and a.dtype.kind in "iufc"}  # fmt: skip
+    except _BROKEN as error:
+        raise BadInput(f"can't be read as {kind}: {_line(error)}") from None
 
 
 def _needs(package: str, kind: str) -> BadInput:
@@ -172,7 +180,7 @@ def _read_edf(path: Path, choice: Choice) -> Recording:
     try:
         read = edfio.read_bdf if path.suffix.lower() == ".bdf" else edfio.read_edf
         signals = read(path).signals
-    except (ValueError, KeyError, IndexError, NotImplementedError) as error:
+    except _BROKEN as error:
         raise BadInput(f"can't be read as an EDF or BDF file: {_line(error)}") from None
     if not signals:
         raise BadInput("has no signal")
@@ -227,6 +235,8 @@ def _load(path: Path) -> Any:
         begin = file.read(6)
     if not begin.startswith((b"\x93NUMPY", b"PK")):
         raise BadInput("is no file of NumPy arrays; pickled objects are not read")
+    if begin.startswith(b"PK") and not zipfile.is_zipfile(path):
+        raise BadInput("can't be read: the archive is damaged or cut off")
     try:
         return np.load(path, allow_pickle=False)
     except ValueError as error:
@@ -247,7 +257,7 @@ def _read_netcdf(path: Path, choice: Choice) -> Recording:
             return _labelled(dataset, choice)
     except BadInput:
         raise
-    except (ValueError, TypeError, ImportError) as error:
+    except (*_BROKEN, ImportError) as error:
         if "engine" in str(error) or "backend" in str(error):
             needs = "is NetCDF 4 (or no NetCDF); that needs the package netCDF4 or h5netcdf"
             raise BadInput(needs) from None
@@ -262,7 +272,7 @@ def _read_zarr(path: Path, choice: Choice) -> Recording:
             return _labelled(dataset, choice)
     except BadInput:
         raise
-    except (ValueError, KeyError, TypeError, FileNotFoundError) as error:
+    except (*_BROKEN, FileNotFoundError) as error:
         raise BadInput(
             f"can't be read as a group of arrays with named dimensions: {_line(error)}"
         ) from None

@@ -216,6 +216,35 @@ def test_contradictions_are_refused_in_one_line(
     assert said in err.splitlines()[-1]
 
 
+@pytest.mark.parametrize("ending", [".nc", ".mat", ".h5", ".edf", ".npz", ".csv.gz"])
+def test_damaged_files_are_refused_in_one_line(tmp_path: Path, ending: str) -> None:
+    heads = {
+        ".nc": b"CDF\1",
+        ".mat": b"MATLAB 5.0".ljust(124) + b"\0\1IM",
+        ".edf": b"0".ljust(300),
+        ".h5": b"\x89HDF\r\n\x1a\n",
+        ".npz": b"PK\3\4",
+        ".csv.gz": b"\x1f\x8b\x08",
+    }
+    file = tmp_path / f"a{ending}"
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        file.write_bytes(heads[ending] + rng.bytes(200))
+        with pytest.raises(BadInput, match=r"^.*/a\.[a-z0-9.]+: [^\n]+$"):
+            read_recording(file, Choice())
+
+
+def test_names_that_are_no_text_are_printed_and_drawn(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (file,) = write(tmp_path, [0])
+    name = os.fsdecode(b"b \xff$\n.npz")
+    file.rename(tmp_path / name)
+    assert main(["classify", str(tmp_path), "--out", str(tmp_path / "out")]) == 0
+    assert "b \\udcff$\\n.npz  16" in capfd.readouterr().out
+    assert (tmp_path / "out" / "recordings.png").exists()
+
+
 def as_edf(edfio: object, file: Path, u: Array) -> None:
     signals = [
         edfio.EdfSignal(column, sampling_frequency=50, label=f"ch{i}")  # type: ignore[attr-defined]
