@@ -121,6 +121,17 @@ def test_signals_are_in_the_order_of_communities() -> None:
     assert (np.diff(rank) >= 0).all()
 
 
+def test_communities_are_looked_for_in_networks_that_are_not_too_large(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    unknown = Network.from_edges(SHUFFLED.links)
+    assert unknown.groups is None
+    assert len(community_bounds(unknown, picture_order(unknown))) == 2
+    monkeypatch.setattr(layout, "_MOST_ORDERED", unknown.n_links - 1)
+    assert picture_order(unknown) is None
+    assert picture_order(SHUFFLED) is not None
+
+
 def test_order_of_ones_own_that_mixes_communities_has_no_bounds() -> None:
     mixed = Network.modular([3, 3], 1.0, 0.0, seed=0).with_order([0, 3, 1, 4, 2, 5])
     assert len(community_bounds(mixed, picture_order(mixed))) == 0
