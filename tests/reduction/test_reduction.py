@@ -440,6 +440,7 @@ def test_columns_that_vary_together_are_one_axis():
     (axis,) = free_axes(cells, ("P", "Q", "b"))
     assert axis.names == ("P", "Q")
     assert (axis.plain, axis.symbol) == ("P = Q", "$P = Q$")
+    assert free_axes({"P": np.empty(0), "b": np.full(3, 0.5)}, ("P", "b", "gone")) == []
 
 
 def test_column_that_follows_from_others_is_no_axis():
