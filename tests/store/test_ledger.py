@@ -39,6 +39,7 @@ from chimera_hpc.store.ledger import (
     seal,
     unfinished,
     unseal,
+    with_those_behind,
 )
 from chimera_hpc.store.store import Store
 
@@ -200,6 +201,13 @@ def test_unfinished_are_the_never_run_and_the_failures_asked_for() -> None:
     assert only.tolist() == [True, False, False, False, True, False]
     earlier = unfinished(columns, 9, before=2)
     assert earlier.tolist() == [True, False, False, True, False, True]
+
+
+def test_points_that_a_chain_left_are_run_with_the_first_one_before_them() -> None:
+    status = np.full(8, Status.NOT_STARTED, dtype=np.int64)
+    status[[0, 4, 6]] = Status.TIME_OUT, Status.DONE, Status.TIME_OUT
+    found = with_those_behind(status == Status.TIME_OUT, status, 4)
+    assert np.flatnonzero(found).tolist() == [0, 1, 2, 3, 6, 7]
 
 
 def test_not_a_store_is_bad_input(tmp_path: Path) -> None:
