@@ -11,7 +11,8 @@ All three look at Ward's clusters of points scaled to [0, 1].
 - Stability: mean adjusted Rand index between the clusters of two random subsets of two thirds, on
   the runs that both hold.
 
-Points far from all others but few are no class: they are set apart first.
+Points far from all others but few are no class: they are set apart first. If the others then fill
+less than a tenth of the range of all, what is left between them is no class: only k = 1 is tried.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ SMALLEST = 0.05
 """Least share of the runs that makes a class."""
 _FAR = 5.0
 """Distance to the nearest runs beyond which a run is set apart, in those of nine tenths of all."""
+_ALIKE = 0.1
+"""Share of the range of all runs: where others lie apart, runs within it are one state."""
 _REFERENCES = 20
 _DRAWS = 10
 _STABLE = 0.9
@@ -110,7 +113,8 @@ def class_number(points: Floats, seed: int = 0, least: ArrayLike = 0.0) -> Class
     apart = far_from_others(chosen, least)
     kept = chosen[~apart]
     scaled = tree.scale(kept, tree.limits(kept, least))
-    most = max(1, min(MOST, len(np.unique(scaled, axis=0)), len(scaled) - 1))
+    alike = apart.any() and bool((np.ptp(kept, axis=0) <= _ALIKE * np.ptp(chosen, axis=0)).all())
+    most = 1 if alike else max(1, min(MOST, len(np.unique(scaled, axis=0)), len(scaled) - 1))
     labels = _cuts(scaled, most)
     gap, error = _gap(scaled, labels, rng)
     return ClassNumber(

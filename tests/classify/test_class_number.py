@@ -42,6 +42,16 @@ def test_kinds_are_counted(sizes: tuple[int, ...]) -> None:
     np.testing.assert_array_equal(class_number(shuffled).stability, found.stability)
 
 
+def test_remainders_of_one_state_are_no_classes_next_to_runs_apart() -> None:
+    # as runs in phase, which differ by what is left of their starts, next to two chimeras
+    rng = np.random.default_rng(0)
+    left = np.repeat([[1e-5, 0.0, 0.0], [2e-4, 1e-4, 1e-4]], [50, 20], axis=0)
+    points = np.vstack([left * rng.uniform(0.8, 1.2, (70, 1)), [[6e-3, 4e-3, 3e-3]] * 2])
+    points[-1, 0] += 1e-3
+    assert class_number(points[:70]).answer == 2
+    assert class_number(points).sentence.startswith("70 of 72 runs look like one state; 2 lie ap")
+
+
 def test_equal_points_are_one_state_and_two_values_two() -> None:
     assert class_number(np.ones((20, 3))).answer == 1
     assert class_number(np.repeat(CENTRES[:2], 20, axis=0)).answer == 2
