@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from argparse import ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from chimera_hpc.cli.classify import _number_of_clusters
 from chimera_hpc.store.schema import sample_times
 from chimera_hpc.store.store import Store
 
@@ -300,3 +302,10 @@ def test_wrong_options_are_refused_on_one_line(options: tuple[str, ...], said: s
     assert (code, out) == (2, "")
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_number_of_clusters_is_a_number_or_auto() -> None:
+    assert [_number_of_clusters(text) for text in ("3", "auto")] == [3, "auto"]
+    for text in ("0", "-1", "many"):
+        with pytest.raises(ArgumentTypeError, match="a number from 1 on, or auto"):
+            _number_of_clusters(text)

@@ -17,6 +17,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.job import Sweep, user_models
 from chimera_hpc.job.models import build
 from chimera_hpc.models.held import held_values
+from chimera_hpc.models.source import source_files
 from chimera_hpc.run.second_draw import check_in_second_process, drawn
 from chimera_hpc.store.origin import stored_origin
 from chimera_hpc.store.provenance import differences, model_source
@@ -196,6 +197,15 @@ def test_a_file_that_is_read_point_by_point_is_recorded(tmp_path: Path) -> None:
     np.save(tmp_path / "a" / "W1.npy", np.zeros(1))
     lines = differences(before, model_source(Sweep.load(job)))
     assert [line.split(":")[0] for line in lines] == ["W1.npy"]
+
+
+def test_source_is_the_modules_that_are_imported_and_all_of_their_packages(tmp_path: Path) -> None:
+    (tmp_path / "pack").mkdir()
+    files = ["mine.py", "one.py", "pack/__init__.py", "pack/part.py"]
+    for name in (*files, "other.py"):
+        (tmp_path / name).write_text("import one, pack" if name == "mine.py" else "")
+    found = source_files(tmp_path / "mine.py", "mine")
+    assert [str(file.relative_to(tmp_path)) for file in found.code] == files
 
 
 def test_held_values_of_any_object() -> None:
