@@ -106,7 +106,10 @@ def replay(store: Store, chosen: Sequence[int], focus: int | None = None) -> lis
         signals[row] = SeriesInMemory(u if len(which) == 1 else u.copy()), w[:, first:].T.copy()
 
     starts = store.starts(which)
-    made = run_block(store.sweep, store.points[which], on_signals=keep, starts=starts)
+    # A result with room for the series would hold them a second time.
+    series = store.sweep.keep.model_copy(update={"series": "none"})
+    sweep = store.sweep.model_copy(update={"keep": series})
+    made = run_block(sweep, store.points[which], on_signals=keep, starts=starts)
     ledger, names, times = store.ledger(), classes_of(store), sample_times(store.sweep)
     found = digests(made.features, made.scalars)
     return [
