@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chimera_hpc.plot.indicators import profiles_of
+from chimera_hpc.plot.indicators import _draw_profile, profiles_of
 from chimera_hpc.plot.judged import judged
 from chimera_hpc.plot.portrait import ring_portrait
+from chimera_hpc.plot.raster import Raster
+from chimera_hpc.plot.spacetime import draw_raster
 from chimera_hpc.plot.spectrum import Spectrum, spectrum
 
 T = 0.1 * np.arange(101)
@@ -51,3 +53,16 @@ def test_profiles_take_the_rows_of_their_names():
     found = profiles_of(np.arange(8.0)[:, None] * np.ones(5))
     assert [np.asarray(x)[0] for x in (found.amplitude, found.frequency, found.phase)] == [0, 1, 2]
     assert [np.asarray(x)[0] for x in (found.amplitude_std, found.phase_std)] == [4, 6]
+
+
+def test_flat_profile_looks_flat_and_ranges_have_colours_of_their_own():
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    _draw_profile(axes, 100.0 + 1e-9 * np.arange(8), np.zeros(8), 0.0)
+    assert axes.get_ylim() == pytest.approx((95.0, 105.0))
+    values = np.ones((3, 4))
+    for is_range, colours in ((False, "viridis"), (True, "magma")):
+        image = draw_raster(axes, Raster(values, (0.0, 1.0), (0, 3), is_range=is_range), 2.0)
+        assert image.get_cmap().name == colours
+        assert image.get_clim() == (0.0 if is_range else -2.0, 2.0)
