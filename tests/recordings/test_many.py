@@ -118,7 +118,7 @@ def test_files_are_found_in_folders_and_by_patterns(tmp_path: Path) -> None:
     left = [f"{tmp_path / 'a'}: file notes.md left out: no recordings"]
     assert recording_files([tmp_path / "a"]) == (files, left)
     again = tmp_path / "b" / ".." / "a" / files[0].name
-    words = [f"{tmp_path}/a/*-1.npz", files[1], files[0], again]
+    words: list[str | Path] = [f"{tmp_path}/a/*-1.npz", files[1], files[0], again]
     assert recording_files(words) == ([files[1], files[0]], [])
     links = tmp_path / "a" / "ring.csv"
     links.touch()
