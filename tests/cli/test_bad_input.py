@@ -126,3 +126,10 @@ def test_an_empty_name_of_a_file_or_folder_is_refused_by_every_command(capsys):
         main(["export", "results", "--to", ""])
     assert end.value.code == 2
     assert "--to: empty" in capsys.readouterr().err
+
+
+def test_merge_without_the_name_of_the_new_folder_is_refused(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["merge", "one", "two"])
+    assert end.value.code == 2
+    assert "required: --out" in capsys.readouterr().err

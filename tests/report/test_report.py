@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bokeh.models import ColumnDataSource
 
 from chimera_hpc.classify.classification import Classification
+from chimera_hpc.job import Sweep
+from chimera_hpc.job.shipped import job_file
 from chimera_hpc.network.network import Network
 from chimera_hpc.reduction.reduction import reduce_sweep
+from chimera_hpc.reduction.runs import drawn_network
+from chimera_hpc.report import charts, pictures, write_report
 from chimera_hpc.report import content as contents
-from chimera_hpc.report import pictures, write_report
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import look_of
 from chimera_hpc.report.networks import drawing
@@ -382,3 +386,17 @@ def test_network_for_the_page_is_thinned_and_says_so():
     sides = np.column_stack([first["x"], first["y"]])[first["marks"]]
     np.testing.assert_allclose(sides[0], [[0.0, 1.0], [0.951, 0.309]])
     assert first["partly"] == ""
+
+
+def test_network_of_a_point_is_drawn_where_the_job_has_one() -> None:
+    said: list[str] = []
+    sweep = Sweep.load(job_file("examples/small_world"))
+    drawn = drawn_network(sweep, sweep.points().row(0), said.append)
+    assert drawn is not None
+    assert (drawn.n_nodes, said) == (sweep.n_nodes, [])
+
+
+def test_picture_of_a_run_stands_on_its_lower_left_corner() -> None:
+    source = ColumnDataSource({name: [] for name in ("url", "x", "y", "w", "h")})
+    frame = charts.picture({"picture": source}, 8, "node")
+    assert frame.renderers[0].glyph.anchor == "bottom_left"

@@ -17,6 +17,7 @@ from chimera_hpc.store.blocks import DamagedChunk
 from chimera_hpc.store.merge import merge
 from chimera_hpc.store.schema import decode_series
 from chimera_hpc.store.store import Store
+from chimera_hpc.store.strips import StoredSeries
 
 
 def store_of(path: Path, u: np.ndarray, *overrides: str) -> Store:
@@ -45,6 +46,8 @@ def test_nodes_are_those_of_the_whole_series(tmp_path: Path, dtype: str, kind: s
     for part in (slice(0, 1), slice(149, 150), slice(7, 93), slice(None), slice(3, 140, 17)):
         np.testing.assert_array_equal(series[part], whole[part])
     assert series[5:5].shape == (0, 2001)
+    # Of a sweep whose networks differ in size.
+    assert [StoredSeries(store.files, 0, n)[:].shape[0] for n in (None, 90)] == [150, 90]
 
 
 def test_damage_is_found_and_a_point_that_never_ran_is_said(tmp_path: Path) -> None:
