@@ -122,7 +122,7 @@ def _within(n: int, p: float, rng: np.random.Generator) -> Integers:
     row = np.cumsum(np.arange(n)[::-1])  # pairs up to the last one of each tail
     chosen = _chosen(n * (n - 1) // 2, p, rng)
     tail = np.searchsorted(row, chosen, side="right")
-    return np.column_stack([tail, chosen - row[tail] + n]) if n > 1 else np.empty((0, 2), np.int64)
+    return np.column_stack([tail, chosen - row[tail] + n])
 
 
 def _chosen(count: int, p: float, rng: np.random.Generator) -> Integers:
@@ -135,7 +135,7 @@ def _chosen(count: int, p: float, rng: np.random.Generator) -> Integers:
         skips = np.floor(np.log1p(-rng.random(1000)) / np.log1p(-p))
         found.append(at + np.cumsum(1 + np.minimum(skips, count).astype(np.int64)))
         at = int(found[-1][-1])
-    every = np.concatenate(found) if found else np.empty(0, np.int64)
+    every = np.concatenate(found)
     return every[every < count]
 
 
