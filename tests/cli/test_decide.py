@@ -152,7 +152,6 @@ def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
     assert results(tmp_path / "sweep")["decide"] == results(decided / "sweep")["decide"]
 
 
-@pytest.mark.slow
 def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
     job = ("run", decided / "job.toml", "--cluster", "serial", "--no-figures")
     few = ("Q=0", "decide.first=2", "decide.batch=2", "decide.most=4", "decide.refine={}")
