@@ -183,13 +183,14 @@ def save(figure: Figure, path_without_suffix: str | Path) -> tuple[Path, Path]:
     stem = Path(path_without_suffix)
     png, pdf = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".pdf")
     with mpl.rc_context(SETTINGS):
-        figure.savefig(png, dpi=200)
+        figure.draw_without_rendering()
         for _ in range(_TRIES):
             if not thin_ticks(figure):
                 break
-            figure.savefig(png, dpi=200)
-        # Both files share one layout, which takes a third of the time of drawing.
-        figure.set_layout_engine("none")
+            figure.draw_without_rendering()
+        # With a layout engine, matplotlib draws twice for each file.
+        figure.set_layout_engine(None)
+        figure.savefig(png, dpi=200)
         figure.savefig(pdf, dpi=200, metadata={"CreationDate": None})
     return png, pdf
 
