@@ -189,7 +189,8 @@ def _run(
 ) -> tuple[int, float]:
     wait(needed)
     began = time.monotonic()
-    place = ["--cluster", "serial"] if quick else ["--workers", str(workers)]
+    # A single worker would compute the same in a process that takes seconds to start.
+    place = ["--workers", str(workers)] if workers > 1 else ["--cluster", "serial"]
     changes = [word for text in settings(name, quick) for word in ("--set", text)]
     job = jobs_folder() / "paper" / f"{name}.toml"
     command = [sys.executable, "-P", "-m", "chimera_hpc.sweep", "run", str(job)]
