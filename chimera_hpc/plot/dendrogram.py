@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.cluster import hierarchy
 
+from chimera_hpc.base.wording import number_of
 from chimera_hpc.classify.classification import Classification, Cut
 from chimera_hpc.classify.classifiers import AGGLOMERATIVE
 from chimera_hpc.plot import style
@@ -78,7 +79,7 @@ def draw_dendrogram(
     axes.set_ylim(0.0, 1.05 * top)
     axes.set_xticks([])
     sample = f"sample of {len(leaf_labels)} of " if n_runs > len(leaf_labels) else ""
-    axes.set_xlabel(f"{sample}{n_runs or len(leaf_labels)} runs", labelpad=6.0)
+    axes.set_xlabel(sample + number_of(n_runs or len(leaf_labels), "run"), labelpad=6.0)
     axes.set_ylabel("depth $d$ (scaled units)")
     # Beside the panel's letter: at the line itself it would cover branches.
     words = f"cut at $d$ = {depth:.3g}" if np.isfinite(depth) else "classes without the tree"

@@ -10,6 +10,7 @@
   let source, model;
 
   const sum = (list) => list.reduce((a, b) => a + b, 0);
+  const numberOf = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
   const cut = () => data.cuts[state.cut];
 
   function entropy(votes) {
@@ -127,7 +128,7 @@
       runs: tree.sizes,
     };
     model("cut").location = depth;
-    $("tree-clusters").textContent = `${state.tree} clusters at depth ${Number(depth.toPrecision(3))}`;
+    $("tree-clusters").textContent = `${numberOf(state.tree, "cluster")} at depth ${Number(depth.toPrecision(3))}`;
     if ($("judged")) $("judged").hidden = state.cut !== "judge";
   }
 
@@ -140,7 +141,7 @@
       sign.className = "sign";
       sign.style.color = look.colour;
       sign.textContent = look.sign;
-      item.append(sign, `${look.name}: ${others[i]} runs`);
+      item.append(sign, `${look.name}: ${numberOf(others[i], "run")}`);
       return [item];
     }));
     $("cut-words").textContent = state.tree;
@@ -215,7 +216,7 @@
     select(rows, indices);
     describe();
     if (indices.length) {
-      $("details-name").textContent = `${indices.length} runs in ${rows.length} cells chosen`;
+      $("details-name").textContent = `${numberOf(indices.length, "run")} in ${numberOf(rows.length, "cell")} chosen`;
       $("details-words").textContent = "Their cells have a frame on the map.";
     }
   }
@@ -337,7 +338,7 @@
     if (name !== "judge") state.tree = name;
     if ($("by")) $("by").value = name === "judge" ? "judge" : "tree";
     $("cut").value = String(trees.indexOf(state.tree));
-    $("cut").setAttribute("aria-valuetext", `${state.tree} clusters`);
+    $("cut").setAttribute("aria-valuetext", numberOf(state.tree, "cluster"));
     drawAll();
   }
 
