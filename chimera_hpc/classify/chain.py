@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 def ward(points: Floats) -> Floats:
@@ -23,18 +24,26 @@ def ward(points: Floats) -> Floats:
     Clusters of s and t points with centroids x and y merge at the height
     ``sqrt(2 s t / (s + t)) |x - y|``. Takes O(m) memory and O(m^2) time.
     """
-    return _number(sorted(_merges(points), key=lambda merge: merge[2]))
+    first, group = np.unique(points, axis=0, return_index=True, return_inverse=True)[1:]
+    one = first[group.ravel()]
+    # Equal points merge at once: redrawn runs are a third copies.
+    copies = np.flatnonzero(one != np.arange(len(points)))
+    equal = [(int(one[copy]), int(copy), 0.0) for copy in copies]
+    leaves = np.sort(first)
+    sizes = np.bincount(one, minlength=len(points))[leaves]
+    merges = _merges(_Clusters(points[leaves], sizes, leaves))
+    return _number(equal + sorted(merges, key=lambda merge: merge[2]))
 
 
 class _Clusters:
     """The remaining clusters in contiguous arrays: centroids, weights and one leaf of each."""
 
-    def __init__(self, points: Floats) -> None:
+    def __init__(self, points: Floats, sizes: Integers, leaves: Integers) -> None:
         self.centroids = np.array(points.T, dtype=np.float64, order="C")
         """(n_columns, m)"""
-        self.weights = np.ones(len(points))
+        self.weights = 1.0 / sizes
         """One over the number of points."""
-        self.leaves = np.arange(len(points))
+        self.leaves = leaves
         self.n = len(points)
         self._steps = np.empty_like(self.centroids)
         self._distances, self._sums = np.empty((2, self.n))
@@ -69,9 +78,8 @@ class _Clusters:
         self.leaves[other] = self.leaves[self.n]
 
 
-def _merges(points: Floats) -> Iterator[tuple[int, int, float]]:
+def _merges(clusters: _Clusters) -> Iterator[tuple[int, int, float]]:
     """Yield (leaf, leaf, height) of each merge, in the order in which the chains find them."""
-    clusters = _Clusters(points)
     chain, reach = [0], [np.inf]
     while clusters.n > 1:
         following, distance = clusters.nearest(chain[-1], reach[-1])
