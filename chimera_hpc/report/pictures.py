@@ -41,7 +41,7 @@ _STEPS = 256
 """Most nodes in a profile."""
 _COLOURS = 64
 _PROFILES = ("amplitude", "phase", "frequency")
-_BATCH, _BATCH_SAMPLES = 16, 10**7
+_BATCH, _BATCH_SAMPLES = 64, 10**7
 """Runs that are replayed in one go, and the most samples in all of them; a larger one is alone."""
 
 
@@ -98,17 +98,14 @@ def plates(
     pictured = [*stored, *others]
     plain = [i for i in spread if i not in set(pictured)]
     networks = DrawnNetworks(content, _STEPS)
-    series = _all_series(content, [int(chosen[i]) for i in pictured])
+    pictures = _pictures(content, chosen[pictured], networks)
     profiles = _profiles_of(content, chosen[spread])
     made: dict[int, dict[str, Any]] = {}
     size = 0
-    for k, i in enumerate((*pictured, *plain)):
-        plate = _plate(content, int(chosen[i]), profiles[int(chosen[i])])
-        if k < len(pictured):
-            t, u = next(series)
-            network, signals = networks.of(int(chosen[i])), content.store.sweep.signals
-            plate |= _picture(t, in_order(u, network, signals))
-        if (number := networks.number(int(chosen[i]))) is not None:
+    for i in (*pictured, *plain):
+        point = int(chosen[i])
+        plate = _plate(content, point, profiles[point]) | pictures.get(point, {})
+        if (number := networks.number(point)) is not None:
             plate["network"] = number
         size += len(json.dumps(plate))
         if size > MOST_BYTES:
@@ -160,6 +157,18 @@ def affordable(content: Content) -> int:
     seconds = content.scan.columns["elapsed_us"][ran] / 1e6
     budget = min(MOST_SECONDS, max(MOST_SECONDS / 4, float(seconds.sum()) / 10))
     return int(budget / max(float(seconds.mean()), 1e-6))
+
+
+def _pictures(
+    content: Content, points: NDArray[np.int64], networks: DrawnNetworks
+) -> dict[int, dict[str, Any]]:
+    """Return the pictures of points.
+
+    Made in the order of the store, in which neighbours may be integrated side by side.
+    """
+    ordered, signals = np.sort(points).tolist(), content.store.sweep.signals
+    series = zip(ordered, _all_series(content, ordered), strict=True)
+    return {i: _picture(t, in_order(u, networks.of(i), signals)) for i, (t, u) in series}
 
 
 def _all_series(content: Content, points: Sequence[int]) -> Iterator[tuple[Array, NodeSeries]]:
