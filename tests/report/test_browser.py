@@ -168,7 +168,7 @@ def test_moving_the_cut_recolours_map_tree_and_planes(window, pages):
     assert len(set(before["points"])) == 3
     assert len(set(after["points"])) == 2
     assert all(before[key] != after[key] for key in before)
-    assert text(window, "legend").count("runs") == 3  # two clusters, and steady
+    assert text(window, "legend").count(" run") == 3  # two clusters, and one steady run
 
 
 def test_clicking_into_the_tree_moves_the_cut(window, pages):
