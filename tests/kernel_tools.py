@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numba
 import numpy as np
 
 from chimera_hpc.integrate import lane_rows as K
+from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.lanes import Control, LanePool, Outcome, integrate
 from chimera_hpc.integrate.simd import LANES
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
@@ -16,7 +16,7 @@ from chimera_hpc.job import registry
 
 METHODS = {name: registry.method(name) for name in registry.METHODS}
 
-compiled = numba.njit(RIGHT_HAND_SIDE, nogil=True, error_model="numpy")
+compiled = jit(RIGHT_HAND_SIDE)
 
 
 @compiled

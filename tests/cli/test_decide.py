@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
 import re
 from collections.abc import Callable
@@ -39,6 +41,8 @@ JOB = {key: value for key, value in SMALL.items() if key != "grid.seeds"} | {
     "decide.confidence": 0.9,
     "decide.refine": {"P": 1},
 }
+FEW = ("Q=0", "decide.first=2", "decide.batch=2", "decide.most=4", "decide.refine={}")
+BY_ATLAS = [word for text in (*FEW, 'decide.judge="atlas"') for word in ("--set", text)]
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -49,6 +53,16 @@ def decided(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = ["run", str(folder / "job.toml"), "--out", str(folder / "sweep")]
     assert main([*words, "--cluster", "serial", "--no-figures"]) == 0
     return folder
+
+
+@pytest.fixture(scope="module")
+def judged(decided: Path) -> tuple[Path, str]:
+    """A sweep beside it that the classes of the first judge, and what its run printed."""
+    words = ["run", str(decided / "job.toml"), "--out", str(decided / "judged"), *BY_ATLAS]
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        code = main([*words, "--set", 'atlas="sweep"', "--cluster", "serial", "--no-figures"])
+    assert code == 0
+    return decided / "judged", said.getvalue()
 
 
 def results(folder: Path) -> dict[str, Any]:
@@ -152,40 +166,40 @@ def test_workers_leave_the_same_bits(decided, sweep: Run, tmp_path):
     assert results(tmp_path / "sweep")["decide"] == results(decided / "sweep")["decide"]
 
 
-def test_the_classes_of_another_sweep_may_judge(decided, sweep: Run):
-    job = ("run", decided / "job.toml", "--cluster", "serial", "--no-figures")
-    few = ("Q=0", "decide.first=2", "decide.batch=2", "decide.most=4", "decide.refine={}")
-    changes = [word for text in (*few, 'decide.judge="atlas"') for word in ("--set", text)]
-    code, _, err = sweep(*job, *changes, "--out", decided / "lost", "--set", 'atlas="none"')
+def test_a_judge_that_is_not_there_is_refused_before_a_point_is_computed(decided, sweep: Run):
+    job = ("run", decided / "job.toml", "--cluster", "serial", "--no-figures", *BY_ATLAS)
+    code, _, err = sweep(*job, "--out", decided / "lost", "--set", 'atlas="none"')
     assert code == 2
     assert "decide.judge: atlas none: " in err
-    code, _, err = sweep(*job, *changes, "--out", decided / "lost", "--set", 'atlas="lost"')
+    code, _, err = sweep(*job, "--out", decided / "lost", "--set", 'atlas="lost"')
     assert code == 2
     assert "decide.judge: atlas lost is this sweep itself" in err
     lost = Store.open(decided / "lost" / "store.zarr").ledger()["status"]
     assert (lost == Status.NEVER).all()
-    code, out, _ = sweep(*job, *changes, "--out", decided / "judged", "--set", 'atlas="sweep"')
-    assert code == 0
-    assert "judge: atlas sweep; " in out
-    store = Store.open(decided / "judged" / "store.zarr")
+    lost_page = report_of(Content.read(decided / "lost"), most_pictures=0, replay=False)
+    assert "decided by the atlas lost, which is not there (yet)" in lost_page
+    assert "judge" not in data_of(lost_page)["cuts"]
+
+
+def test_the_classes_of_another_sweep_may_judge(decided, judged):
+    folder, said = judged
+    assert "judge: atlas sweep; " in said
+    store = Store.open(folder / "store.zarr")
     atlas = load_atlas(decided / "sweep")
     scalars = store.scalars()
     triplets = np.stack([scalars[name] for name in TRIPLET], axis=1)
     named = np.array(atlas.classify(triplets).name)
-    for cell, rows in zip(results(decided / "judged")["decide"]["cells"], (0, 1), strict=True):
+    for cell, rows in zip(results(folder)["decide"]["cells"], (0, 1), strict=True):
         mine = named[(store.points.cells()[0] == rows) & (named != UNCLASSIFIED)].tolist()
         assert cell["runs"] in (2, 4)
         assert cell["class"] == "steady" or mine.count(cell["class"]) == max(map(mine.count, mine))
-    lost_page = report_of(Content.read(decided / "lost"), most_pictures=0, replay=False)
-    assert "decided by the atlas lost, which is not there (yet)" in lost_page
-    assert "judge" not in data_of(lost_page)["cuts"]
     rows = list(csv.DictReader("".join(table(store)).splitlines()))
     assert [row["class_judge"] or UNCLASSIFIED for row in rows] == named.tolist()
 
 
 @pytest.mark.parametrize("name", ["sweep", "judged"])
 def test_map_table_page_and_results_show_the_classes_by_which_cells_are_decided(
-    decided, sweep: Run, name
+    decided, judged, sweep: Run, name
 ):
     folder = decided / name
     cells = results(folder)["decide"]["cells"]

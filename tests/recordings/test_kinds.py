@@ -18,14 +18,13 @@ from chimera_hpc.recordings.recording import Choice, Recording
 T = 0.02 * np.arange(1501)
 U = np.cos(2 * np.pi * T[:, None] + np.pi / 4 * np.arange(8))
 NAMES = [f"ch{i}" for i in range(8)]
+CELLS = [[f"{x:.6f}" for x in row] for row in U]
 TIMES = [f"{t:.2f}" for t in T]
 
 
 def table(times: list[str], names: list[str], sep: str = ",", comma: bool = False) -> str:
-    def cell(x: float) -> str:
-        return f"{x:.6f}".replace(".", ",") if comma else f"{x:.6f}"
-
-    rows = [sep.join([*([t] if t else []), *map(cell, u)]) for t, u in zip(times, U, strict=True)]
+    cells = [[x.replace(".", ",") for x in row] for row in CELLS] if comma else CELLS
+    rows = [sep.join([*([t] if t else []), *row]) for t, row in zip(times, cells, strict=True)]
     return "\n".join([sep.join(names), *rows]) + "\n"
 
 
