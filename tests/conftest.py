@@ -21,6 +21,16 @@ os.environ["MPLBACKEND"] = "Agg"
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+
+def _no_flush(descriptor: object) -> None:
+    """Nothing waits for the disk: only a loss of power could show the difference.
+
+    Tests of what is flushed, and when, put a function of their own in its place.
+    """
+
+
+os.fsync = _no_flush
+
 # A shared machine makes deadlines lie; in CI the same examples are tried every time.
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)

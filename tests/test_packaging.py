@@ -9,6 +9,7 @@ import sys
 import tomllib
 import zipfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,11 @@ def test_only_the_command_that_is_typed_is_loaded(typed, loaded):
     assert {"run", "schema"} & names == set(loaded)
 
 
+@cache
+def parsed(source: Path) -> ast.Module:
+    return ast.parse(source.read_text(encoding="utf-8"))
+
+
 def module_name(source: Path) -> str:
     """Dotted name below chimera_hpc; empty for the package itself."""
     parts = source.relative_to(PACKAGE).with_suffix("").parts
@@ -115,7 +121,7 @@ def imported_modules(source: Path) -> Iterator[str]:
     here = ["chimera_hpc", *filter(None, module_name(source).split("."))]
     if source.name != "__init__.py":
         here.pop()
-    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(source)):
         names = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -142,7 +148,7 @@ def test_top_level_holds_the_layers_and_two_files():
 
 def test_every_folder_says_in_one_sentence_what_it_is():
     for name in LAYERS:
-        text = ast.get_docstring(ast.parse((PACKAGE / name / "__init__.py").read_text("utf-8")))
+        text = ast.get_docstring(parsed(PACKAGE / name / "__init__.py"))
         assert text, name
         first = text.partition("\n\n")[0]
         assert first.endswith("."), name
@@ -152,7 +158,7 @@ def test_every_folder_says_in_one_sentence_what_it_is():
 def test_no_public_class_name_is_defined_in_two_modules():
     homes: dict[str, list[str]] = {}
     for source in SOURCES:
-        for node in ast.parse(source.read_text(encoding="utf-8")).body:
+        for node in parsed(source).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(module_name(source))
     assert {name: places for name, places in homes.items() if len(places) > 1} == {}
@@ -177,7 +183,7 @@ def test_imports_go_one_way_between_folders(source):
 def test_zarr_and_clusters_have_one_door_each():
     doors = {"zarr": "store", "dask_jobqueue": "run"}
     for source in SOURCES:
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(source)):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             if isinstance(node, ast.ImportFrom) and node.module and not node.level:
                 names = [node.module]
@@ -190,7 +196,7 @@ def test_no_kernel_states_fastmath():
     stated = [
         f"{source.relative_to(ROOT)}:{getattr(node, 'lineno', '?')}"
         for source in SOURCES
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(source))
         if (isinstance(node, ast.keyword) and node.arg == "fastmath")
         or (isinstance(node, ast.Constant) and node.value == "fastmath")
     ]
@@ -202,7 +208,7 @@ def test_only_the_command_line_prints():
         f"{source.relative_to(ROOT)}:{node.lineno}"
         for source in SOURCES
         if not f"{module_name(source)}.".startswith(tuple(f"{name}." for name in PRINTING))
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(source))
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Name)
         and node.func.id == "print"
@@ -211,7 +217,7 @@ def test_only_the_command_line_prints():
 
 
 def trees(sources: list[Path]) -> list[tuple[Path, ast.Module]]:
-    return [(source, ast.parse(source.read_text(encoding="utf-8"))) for source in sources]
+    return [(source, parsed(source)) for source in sources]
 
 
 def members(tree: ast.AST) -> Iterator[str]:

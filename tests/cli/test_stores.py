@@ -6,6 +6,7 @@ import csv
 import errno
 import json
 import os
+import shutil
 import zipfile
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -22,6 +23,7 @@ from chimera_hpc.job import Sweep
 from chimera_hpc.store.block_result import failed_block
 from chimera_hpc.store.ledger import FIELDS, point_digest, read_ledger
 from chimera_hpc.store.store import Store
+from chimera_hpc.sweep import main
 
 Run = Callable[..., tuple[int, str, str]]
 SERIAL = ("--cluster", "serial", "--no-figures")
@@ -229,14 +231,20 @@ def digests(folder: Path) -> dict[tuple[int, int], int]:
 # merge
 
 
+@pytest.fixture(scope="module")
+def _parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("parts")
+    (folder / "job.toml").write_text(job_text(SMALL))
+    for name, seeds in (("first", "[0,1,2]"), ("second", "[2,3,4]")):
+        words = ["run", str(folder / "job.toml"), "--out", str(folder / name), *SERIAL]
+        assert main([*words, "--set", f"seeds={seeds}"]) == 0
+    return folder
+
+
 @pytest.fixture
-def parts(job: Path, tmp_path: Path, sweep: Run) -> list[Path]:
-    """Two sweeps that share seed 2."""
-    folders = [tmp_path / "first", tmp_path / "second"]
-    for folder, seeds in zip(folders, ("[0,1,2]", "[2,3,4]"), strict=True):
-        words = ["run", job, "--out", folder, *SERIAL, "--set", f"seeds={seeds}"]
-        assert sweep(*words)[0] == 0
-    return folders
+def parts(_parts: Path, tmp_path: Path) -> list[Path]:
+    """Two sweeps that share seed 2; copies for each test."""
+    return [shutil.copytree(_parts / name, tmp_path / name) for name in ("first", "second")]
 
 
 def test_merged_sweep_equals_one_run_as_a_whole(

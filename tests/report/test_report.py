@@ -63,20 +63,35 @@ def test_seeds_reach_the_pages_script_with_all_their_bits(tmp_path, filled):
     assert {int(seed) for seed in numbers["points"]["seed"]} == set(seeds)
 
 
-def test_one_file_beside_the_store_that_names_nothing_to_load(tmp_path, filled):
-    filled(tmp_path, FAST)
-    page = page_of(tmp_path)
+@pytest.fixture(scope="module")
+def reduced(tmp_path_factory, filled) -> Path:
+    """A sweep with a steady run, a failure, a claim and a curve, and its report."""
+    folder = tmp_path_factory.mktemp("reduced")
+    filled(folder, FAST, "title='Three \"classes\" <b>'", steady=[0], failed=[6])
+    claims = [{"id": "one", "paper": "W is 1", "measured": "0.5", "reproduced": False}]
+    curve = {"x": [0, 1], "fraction": [1.0, 0.5], "low": [0.8, 0.2], "high": [1.0, 0.8]}
+    entry = {"label": "orientation 1, $Q$ = 0", "judge": "diagonal", "by": {"diagonal": curve}}
+    reduce_sweep(folder, claims=claims, curves={"robustness": entry})
+    page_of(folder)
+    return folder
+
+
+@pytest.fixture
+def page(reduced: Path) -> str:
+    return (reduced / "report.html").read_text(encoding="utf-8")
+
+
+def test_one_file_beside_the_store_that_names_nothing_to_load(reduced, page):
     assert len(page) < 10e6
     markup = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert re.findall(r'(?:src|href)="(?!#|data:)', markup) == []
     assert "url(" not in markup
     assert "default-src 'none'" in markup
-    assert list(tmp_path.glob(".*.partial")) == []
+    assert list(reduced.glob(".*.partial")) == []
 
 
-def test_summary_tells_sweep_counts_and_versions(tmp_path, filled):
-    filled(tmp_path, FAST, "title='Three \"classes\" <b>'", steady=[0], failed=[1])
-    words = words_of(page_of(tmp_path))
+def test_summary_tells_sweep_counts_and_versions(page):
+    words = words_of(page)
     assert "Three &#34;classes&#34; &lt;b&gt;" in words
     assert "15 points in 3 cells, 5 seeds; P = Q: 2, 3, 4." in words
     assert "13 done: it oscillates" in words
@@ -84,6 +99,22 @@ def test_summary_tells_sweep_counts_and_versions(tmp_path, filled):
     assert "1 time-out: " in words
     assert "chimera_hpc 0, source" in words
     assert "Not finished" not in words
+
+
+def test_failures_are_listed_with_reason_and_command(page):
+    words = words_of(page)
+    assert "P=3 Q=3 seed=1 time-out: integrator.time_out seconds" in words
+    assert re.search(r"sweep why \S+ P=3 Q=3 seed=1", words)
+    assert "1 point failed." in words
+
+
+def test_claims_of_the_results_are_shown(page):
+    assert "one W is 1 0.5 ✗ no" in words_of(page)
+
+
+def test_robustness_curves_have_a_chart(page):
+    assert "Share of chimeras against reversed links Q_r" in words_of(page)
+    assert "orientation 1, Q = 0, judged by diagonal" in page
 
 
 @pytest.mark.slow
@@ -175,27 +206,12 @@ def test_axes_of_the_map_are_what_varies(tmp_path, filled, overrides, axes):
         assert set(column) == set(range(len(axis["values"])))
 
 
-def test_failures_are_listed_with_reason_and_command(tmp_path, filled):
-    filled(tmp_path, FAST, failed=[6])
-    words = words_of(page_of(tmp_path))
-    assert "P=3 Q=3 seed=1 time-out: integrator.time_out seconds" in words
-    assert re.search(r"sweep why \S+ P=3 Q=3 seed=1", words)
-    assert "1 point failed." in words
-
-
 @pytest.mark.slow
 def test_long_list_of_failures_is_cut(tmp_path, filled):
     filled(tmp_path, FAST, "seeds=80", "P=3:5", failed=range(240))
     words = words_of(page_of(tmp_path))
     assert f"240 points failed; the first {MOST_FAILURES} are listed" in words
     assert len(re.findall(r"sweep why \S+ P=", words)) == MOST_FAILURES
-
-
-def test_claims_of_the_results_are_shown(tmp_path, filled):
-    filled(tmp_path, FAST)
-    claims = [{"id": "one", "paper": "W is 1", "measured": "0.5", "reproduced": False}]
-    reduce_sweep(tmp_path, claims=claims)
-    assert "one W is 1 0.5 ✗ no" in words_of(page_of(tmp_path))
 
 
 @pytest.mark.slow
@@ -212,16 +228,6 @@ def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
     assert f"1 is full agreement, 0 as by chance, - not defined. {head} triplets" in words
     assert "sigma_1: modes of its density The measures differ in " in words
     assert (tmp_path / "figures" / "verdicts.png").stat().st_size > 0
-
-
-def test_robustness_curves_have_a_chart(tmp_path, filled):
-    filled(tmp_path, FAST)
-    curve = {"x": [0, 1], "fraction": [1.0, 0.5], "low": [0.8, 0.2], "high": [1.0, 0.8]}
-    entry = {"label": "orientation 1, $Q$ = 0", "judge": "diagonal", "by": {"diagonal": curve}}
-    reduce_sweep(tmp_path, curves={"robustness": entry})
-    page = page_of(tmp_path)
-    assert "Share of chimeras against reversed links Q_r" in words_of(page)
-    assert "orientation 1, Q = 0, judged by diagonal" in page
 
 
 def test_tree_of_the_reduction_is_used_again_while_it_fits(tmp_path, filled, monkeypatch):
