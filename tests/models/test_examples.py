@@ -134,6 +134,7 @@ def test_phase_lag_decides_between_order_and_disorder_through_the_whole_pipeline
 ) -> None:
     settings = ["grid.alpha=[1.1, 1.62]", "seeds=3", "n_nodes=40", "R=14", "integrator.t_end=150"]
     settings += ["features.start=120", "features.refine=sine-fit", "reduction.cuts=[2]"]
+    settings += ['reduction.figures=["modal_classes"]']
     words = [word for text in settings for word in ("--set", text)]
     job, out = str(EXAMPLES / "kuramoto_sakaguchi.toml"), str(tmp_path / "out")
     assert main(["run", job, "--out", out, "--cluster", "serial", *words]) == 0
