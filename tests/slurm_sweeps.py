@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.store.ledger import read_ledger
+from chimera_hpc.sweep import main
 
 JOB = SMALL | {
     "grid.P": "2:5",
@@ -57,6 +60,14 @@ def sweep(*words: object, timeout: float = 240) -> subprocess.CompletedProcess[s
     return subprocess.run(
         command(*words), capture_output=True, text=True, timeout=timeout, check=False
     )
+
+
+def sweep_here(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run a command of the sweep in this process, which takes two seconds less."""
+    texts = [str(word) for word in words]
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as errors:
+        code = main(texts)
+    return subprocess.CompletedProcess(texts, code, out.getvalue(), errors.getvalue())
 
 
 def digests(folder: Path) -> np.ndarray[Any, Any]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from slurm_real import Slurm
-from slurm_sweeps import command, sweep, write_job
+from slurm_sweeps import command, sweep, sweep_here, write_job
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.run.slurm import queue, tls
@@ -61,7 +61,7 @@ def test_a_machine_without_slurm_is_told_so(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     for how in (("slurm", "--submit"), ("run", "--cluster", "slurm")):
-        done = sweep(how[0], write_job(tmp_path), "--out", tmp_path / "out", *how[1:])
+        done = sweep_here(how[0], write_job(tmp_path), "--out", tmp_path / "out", *how[1:])
         assert done.returncode == 2
         assert done.stderr == "error: sbatch: not found: this is no machine of a SLURM cluster\n"
 
@@ -89,7 +89,7 @@ def test_the_reason_of_a_waiting_job_is_told(slurm: Slurm, tmp_path: Path) -> No
 
 def test_what_a_submitted_job_waits_for_is_told(slurm: Slurm, tmp_path: Path) -> None:
     words = ("slurm", write_job(tmp_path), "--out", tmp_path / "out", "--submit")
-    done = sweep(*words, "--partition", "closed")
+    done = sweep_here(*words, "--partition", "closed")
     assert done.returncode == 0, done.stderr
     number = done.stdout.split()[2]
     assert done.stdout.splitlines()[-1] == f"job {number} waits: PartitionDown"
@@ -97,7 +97,7 @@ def test_what_a_submitted_job_waits_for_is_told(slurm: Slurm, tmp_path: Path) ->
 
 def test_elements_run_as_many_at_once_as_was_wished(slurm: Slurm, tmp_path: Path) -> None:
     words = ("slurm", write_job(tmp_path), "--out", tmp_path / "out", "--submit")
-    done = sweep(*words, "--set", "slurm.extra=['--hold']", "--at-once", "3")
+    done = sweep_here(*words, "--set", "slurm.extra=['--hold']", "--at-once", "3")
     number = done.stdout.split()[2]
     assert slurm.told(number, "ArrayTaskThrottle") == "3"
 
@@ -131,7 +131,7 @@ def test_a_refusal_is_not_tried_again(slurm: Slurm) -> None:
 
 def test_arrays_are_cut_to_what_slurm_allows(slurm: Slurm, tmp_path: Path) -> None:
     job, out = write_job(tmp_path), tmp_path / "out"
-    done = sweep("slurm", job, "--out", out, "--mode", "array", "--array", "500", "--submit")
+    done = sweep_here("slurm", job, "--out", out, "--mode", "array", "--array", "500", "--submit")
     assert done.returncode == 0, done.stderr
     assert "9 elements in place of 500" in done.stdout
     assert len(slurm.queue()) == 10
@@ -142,20 +142,20 @@ def test_cancel_ends_the_jobs_of_its_own_store_only(slurm: Slurm, tmp_path: Path
     job = write_job(tmp_path)
     hold = ("--set", "slurm.extra=['--hold']")
     for name in ("one", "two"):
-        done = sweep("slurm", job, "--out", tmp_path / name, "--array", "2", *hold, "--submit")
+        done = sweep_here("slurm", job, "--out", tmp_path / name, "--array", "2", *hold, "--submit")
         assert done.returncode == 0, done.stderr
-    done = sweep("cancel", tmp_path / "one")
+    done = sweep_here("cancel", tmp_path / "one")
     assert done.stdout.count("cancelled job") == 3
     left = [name for _, _, name in slurm.queue()]
     two = tmp_path / "two" / "store.zarr"
     assert sorted(left) == sorted(job_name(two, what) for what in ("array", "array", "reduce"))
-    assert "no SLURM job works on" in sweep("cancel", tmp_path / "one").stdout
+    assert "no SLURM job works on" in sweep_here("cancel", tmp_path / "one").stdout
 
 
 def test_a_sweep_that_is_in_the_queue_is_not_submitted_twice(slurm: Slurm, tmp_path: Path) -> None:
     words = ("slurm", write_job(tmp_path), "--out", tmp_path / "out", "--submit")
-    assert sweep(*words, "--set", "slurm.extra=['--hold']").returncode == 0
-    done = sweep(*words)
+    assert sweep_here(*words, "--set", "slurm.extra=['--hold']").returncode == 0
+    done = sweep_here(*words)
     assert done.returncode == 2
     assert re.search(r"job \d+\S* does this already; the command cancel ends it", done.stderr)
 
