@@ -31,15 +31,14 @@ def spoken(name: str) -> str:
 
 
 def agreement_figure(data: FigureInput) -> Figure | None:
-    """Draw a confusion matrix for each pair of the first three methods."""
-    entry = data.curves.get("agreement")
-    if entry is None:
-        return None
+    """Draw a confusion matrix for each of the first three pairs of methods that name classes."""
+    entry = data.curves.get("agreement", {"pairs": ()})
     comparisons = [
         Comparison(spoken(p["rows"]), spoken(p["columns"]), entry["classes"], p["counts"])
-        for p in entry["pairs"][:_MOST_MATRICES]
+        for p in entry["pairs"]
+        if np.any(p["counts"])
     ]
-    return confusion_matrices(comparisons)
+    return confusion_matrices(comparisons[:_MOST_MATRICES]) if comparisons else None
 
 
 def matrix_figure(data: FigureInput) -> Figure | None:

@@ -30,6 +30,7 @@ def test_one_state_of_seventy_runs_and_two_apart() -> None:
     found = class_number(np.vstack([kinds(70), CENTRES[1:]]))
     assert found.answer == found.by_silhouette == found.by_stability == 1
     assert found.sentence.startswith("70 of 72 runs look like one state; 2 lie apart (gap ")
+    assert "; 1 lies apart (" in class_number(np.vstack([kinds(70), CENTRES[1:2]])).sentence
 
 
 @pytest.mark.parametrize("sizes", [(20, 20), (14, 13, 13), (60, 8, 12)])

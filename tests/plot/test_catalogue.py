@@ -13,6 +13,7 @@ from matplotlib.colors import to_hex
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import classify
 from chimera_hpc.job.registry import FIGURES, load
+from chimera_hpc.plot.agreement import agreement_figure
 from chimera_hpc.plot.catalogue import choose, is_figure_name
 from chimera_hpc.plot.classification import classification_figure
 from chimera_hpc.plot.dendrogram import dendrogram_figure
@@ -242,6 +243,16 @@ def test_sweep_without_oscillation_has_its_classes_only():
         assert draw(data, 3) is None
     rows = modal_classes_figure(data, 3).axes[0].get_yticklabels()
     assert [row.get_text() for row in rows] == ["steady"]
+
+
+def test_methods_that_name_no_class_alike_have_no_matrix_of_zeros():
+    pair = {"rows": "triplets", "columns": "SI", "counts": [[0, 0], [0, 0]]}
+    named = {"rows": "SI", "columns": "acm", "counts": [[3, 0], [1, 2]]}
+    entry = {"classes": ["ordered", "chimera"], "pairs": [pair, named]}
+    figure = agreement_figure(outcome(curves={"agreement": entry}))
+    assert [axes.get_ylabel() for axes in figure.axes] == ["SI"]
+    entry["pairs"] = [pair]
+    assert agreement_figure(outcome(curves={"agreement": entry})) is None
 
 
 @pytest.mark.parametrize("place", FIGURES.values(), ids=FIGURES)

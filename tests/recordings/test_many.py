@@ -142,16 +142,47 @@ def test_what_speaks_against_a_comparison_is_said(tmp_path: Path) -> None:
         np.savez(tmp_path / f"{name}.npz", t=t, u=signals)
     (tmp_path / "notes.md").touch()
     a, b, c, d = (str(tmp_path / f"{name}.npz") for name in "abcd")
-    left, copy, nodes, frequency, amplitude = classify_recordings(tmp_path).warnings
+    left, copy, nodes, step, frequency, amplitude = classify_recordings(tmp_path).warnings
     assert left == f"{tmp_path}: file notes.md left out: no recordings"
     assert copy == f"{b}: the same values as {a}; it counts twice"
     assert nodes.startswith(f"6 ({c}) to 16 nodes ({a}): along a smooth state, neighbours differ")
+    assert step == (
+        f"sampling steps of 0.02 ({a}) to 20 ({d}): other units of time? Noise makes more false "
+        "maxima and larger variations the finer the step; --lowpass F damps it in all"
+    )
     assert f"({d}) to " in frequency
     assert frequency.endswith("V_Omega has the unit of frequency; classify files of each unit "
                               "by themselves")  # fmt: skip
     assert amplitude.startswith("median amplitude of 0.00")
     assert f" ({d}) to 0.9" in amplitude or f" ({d}) to 1" in amplitude
     assert classify_recordings([a, tmp_path / "e.npz", tmp_path / "f.npz"]).warnings == []
+
+
+def test_other_sampling_and_other_durations_are_said(tmp_path: Path) -> None:
+    t = 0.02 * np.arange(3000)
+    u = np.cos(2 * np.pi * (t[:, None] + np.arange(N) / N))
+    files = [str(tmp_path / name) for name in ("all.npz", "fifth.npz", "short.npz")]
+    for file, part in zip(files, np.s_[:, ::5, :600], strict=True):
+        np.savez(file, t=t[part], u=u[part])
+    every, fifth, short = files
+    (step,) = classify_recordings([every, fifth]).warnings
+    assert step.startswith(f"sampling steps of 0.02 ({every}) to 0.1 ({fifth}): other units")
+    (periods,) = classify_recordings([every, short]).warnings
+    assert periods.startswith(f"periods: 12 ({short}) to 59.8 ({every}): variations over few")
+
+
+@pytest.mark.parametrize(("one", "other"), [("time (ms)", "time [s]"), ("t_min", "seconds")])
+def test_units_of_time_are_not_mixed_in_silence(tmp_path: Path, one: str, other: str) -> None:
+    u = kind_of_ring(0, np.random.default_rng(7))
+    files = [str(tmp_path / name) for name in ("a.csv", "b.csv", "c.csv")]
+    for i, (file, time) in enumerate(zip(files, (one, other, "time"), strict=True)):
+        head = ",".join([time, *(f"ch{j}" for j in range(N))])
+        rows = np.column_stack([T, np.roll(u, i, axis=1)])
+        np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.6g")
+    units = {"time (ms)": "ms", "t_min": "min"}[one]
+    (said,) = classify_recordings(files).warnings
+    assert said.startswith(f"times in {units} ({files[0]}) and s ({files[1]}), taken as they are")
+    assert classify_recordings(files[1:]).warnings == []
 
 
 def test_one_file_of_many_that_cannot_be_read_is_named(tmp_path: Path) -> None:
