@@ -54,7 +54,7 @@ def lines(one: Recorded, how: Treatment, judge: Judge | None) -> Iterator[str]:
     if judge is None:
         yield "class: none without --atlas STORE"
     else:
-        yield f"class: {found.name or 'none'}, by {judge.path}"
+        yield f"class: {found.name or 'none'}, by {judge}"
     verdict = found.verdict
     if verdict is not None:
         yield f"  distance {verdict.distance:.3g} to the nearest run: {verdict.sentence}"
@@ -107,6 +107,7 @@ def report(one: Recorded, how: Treatment, judge: Judge | None, files: list[Path]
             for name, value in zip(("V_theta", "V_a", "V_Omega"), found.triplet, strict=True)
         },
         "atlas": None if judge is None else str(judge.path),
+        "atlas_model": None if judge is None else judge.model,
         "class": found.name,
         "nearest": None if verdict is None else verdict.name,
         "confidence": None if verdict is None else verdict.confidence,
@@ -174,7 +175,7 @@ def table(made: Collection, judge: Judge | None) -> Iterator[str]:
             yield f"warning: {one.path}: {warning}"
     for warning in made.warnings:
         yield f"warning: {warning}"
-    yield made.sentence if judge is None else f"classes of {judge.path}"
+    yield made.sentence if judge is None else f"classes of {judge}"
 
 
 def _row(made: Collection, i: int) -> tuple[str, ...]:

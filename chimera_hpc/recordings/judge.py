@@ -64,6 +64,11 @@ class Judge:
     """Of each run; None for signals on links or triangles."""
     pairs: str = "ring"
     """Over which variations were taken: "ring", "links" or "order"."""
+    model: str = ""
+    """Of the sweep, as its job names it."""
+
+    def __str__(self) -> str:
+        return f"{self.path}, runs of {self.model}" if self.model else str(self.path)
 
     @classmethod
     def load(cls, path: Path, preset: str | None = None) -> Judge:
@@ -80,7 +85,7 @@ class Judge:
         sweep, typical = store.sweep, _typical(store)
         nodes = sweep.n_nodes if sweep.signals == "nodes" else None
         step = sweep.integrator.t_step
-        return cls(folder, atlas, step, settings, *typical, nodes=nodes, pairs=sweep.pairs)
+        return cls(folder, atlas, step, settings, *typical, nodes, sweep.pairs, sweep.model)
 
 
 def _measured_by(folder: Path, sweep: Sweep, preset: str | None) -> tuple[Features, str]:

@@ -52,7 +52,12 @@ def agreement_lines(entry: Agreement) -> list[str]:
         "  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     )
-    return [f"{CAPTION}:", head, *numbers, differing_line(entry)]
+    return [f"{CAPTION}:", head, *numbers, *remarks(entry), differing_line(entry)]
+
+
+def remarks(entry: Agreement) -> list[str]:
+    """Return what is to be known of the numbers, a line each; results of before have none."""
+    return [entry["remark"]] if entry.get("remark") else []
 
 
 def differing_line(entry: Agreement) -> str:

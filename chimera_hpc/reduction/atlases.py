@@ -11,6 +11,7 @@ from chimera_hpc.classify.atlas import Atlas
 from chimera_hpc.reduction.conventions import OWN, stored_reduction
 from chimera_hpc.reduction.results import read_results
 from chimera_hpc.store.reduction import sibling
+from chimera_hpc.store.store import Store
 
 
 def load_atlas(folder: str | Path, convention: str = OWN) -> Atlas:
@@ -45,7 +46,15 @@ def atlases_of(
             say(f"atlas {name}: {place} has no classes")
         else:
             found[name] = atlas
+            _warn_of_model(folder, place, f"atlas {name}", say)
     return found
+
+
+def _warn_of_model(folder: Path, place: Path, name: str, say: Callable[[str], None]) -> None:
+    ours, theirs = (Store.open(one / "store.zarr").sweep.model for one in (folder, place))
+    if ours != theirs:
+        say(f"{name}: its runs are of the model {theirs}, these of {ours}: its classes and their "
+            "names are those of another system")  # fmt: skip
 
 
 def curves_beside(

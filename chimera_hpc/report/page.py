@@ -29,6 +29,7 @@ from chimera_hpc.reduction.agreement_text import (
     differing_line,
     differing_rows,
     matrix_rows,
+    remarks,
 )
 from chimera_hpc.reduction.atlases import curves_beside
 from chimera_hpc.reduction.audit_text import (
@@ -197,7 +198,7 @@ def _agreement(content: Content) -> dict[str, Any]:
         "caption": CAPTION,
         "matrix": matrix_rows(entry),
         "rules": entry.get("rules", {}),
-        "line": differing_line(entry),
+        "line": "; ".join([*remarks(entry), differing_line(entry)]),
         "cells": differing_rows(entry),
     }
 

@@ -133,7 +133,7 @@ def test_recording_outside_the_atlas_has_no_class_but_a_nearest(
     assert found["nearest"] in {"ordered", "chimera", "disordered"}
     code, out, _ = sweep("classify", "far.npz", "--atlas", folder, "--no-figures")
     assert code == 0
-    assert f"class: none, by {folder}\n" in out
+    assert f"class: none, by {folder}, runs of topological_fhn\n" in out
     assert f"the nearest class is {found['nearest']}\n" in out
     inside = as_json(sweep, folder, "--select", f"point={i}", "--atlas", folder)
     assert inside["class"] == inside["nearest"]

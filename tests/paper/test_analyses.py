@@ -227,6 +227,16 @@ def test_three_methods_that_agree_have_diagonal_matrices() -> None:
     assert made["differing"] == []
 
 
+def test_steady_runs_that_si_does_not_call_ordered_are_counted() -> None:
+    runs = three_kinds()
+    runs.status[10:14] = STEADY  # two ordered ones by SI, two chimeras
+    made = load(ANALYSES["agreement"])(runs)
+    said = "SI does not call 2 of 4 steady runs ordered: in what is left of a run at rest, delta"
+    assert agreement_lines(made)[-2].startswith(said)
+    runs.status[12:14] = DONE
+    assert load(ANALYSES["agreement"])(runs)["remark"] == ""
+
+
 def test_methods_that_differ_are_listed_by_cell() -> None:
     runs = three_kinds()
     runs.scalars["local_sigma_2"][:12] = 2.0  # P = 5: half of the groups are incoherent now

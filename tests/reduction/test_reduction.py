@@ -17,6 +17,7 @@ from chimera_hpc.base.status import Status
 from chimera_hpc.classify.classification import classify
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.models import build
+from chimera_hpc.reduction.atlases import atlases_of
 from chimera_hpc.reduction.cells import FreeAxis, describe, free_axes
 from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.reduction.selection import check_selections, find_point, single_point
@@ -550,6 +551,22 @@ def test_classes_of_another_system_have_letters_everywhere(tmp_path):
     text = "\n".join([*lines, (tmp_path / "results.json").read_text()])
     assert not any(name in text for name in CLASSES.values())
     assert Content.read(tmp_path).classification.base.names == ("A", "B", "C")
+
+
+def test_an_atlas_of_another_model_is_said_to_be_one(tmp_path):
+    filled(tmp_path / "judge", FAST)
+    told(tmp_path / "judge")
+    make_store(tmp_path / "same", FAST)
+    data = {"name": "x", "model": "kuramoto_sakaguchi", "grid": {"P": [2, 3]}}
+    Store.plan(tmp_path / "other/store.zarr", Sweep.model_validate(data))
+    said = []
+    assert list(atlases_of(tmp_path / "same", ["judge"], said.append)) == ["judge"]
+    assert said == []
+    assert list(atlases_of(tmp_path / "other", ["judge"], said.append)) == ["judge"]
+    assert said == [
+        "atlas judge: its runs are of the model topological_fhn, these of kuramoto_sakaguchi: its "
+        "classes and their names are those of another system"
+    ]
 
 
 def test_measures_are_compared_by_partition_where_classes_have_letters(tmp_path):

@@ -45,6 +45,7 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
         "delta": given.sweep.reduction.deltas[0],
         "classes": CLASSES,
         "rules": rules,
+        "remark": _of_rest(given, methods["SI"]),
         # A measure that is added comes with its pairs at the end.
         "pairs": [
             _pair(methods, modal, row, column)
@@ -91,6 +92,17 @@ def _methods(given: AnalysisInput) -> tuple[dict[str, Verdicts], dict[str, str]]
         for run in np.flatnonzero(~given.has_result):
             verdicts[run] = None
     return methods, rules
+
+
+def _of_rest(given: AnalysisInput, verdicts: Verdicts) -> str:
+    """Return how many steady runs SI calls something else than ordered, in words; or ""."""
+    steady = np.flatnonzero(given.status == Status.STEADY)
+    count = sum(verdicts[run] != "ordered" for run in steady)
+    if not count:
+        return ""
+    why = ": in what is left of a run at rest, delta is a share of a small range"
+    said = f"SI does not call {count} of {len(steady)} steady runs ordered"
+    return said + why * (given.sweep.reduction.delta_unit == "range")
 
 
 def _pair(
