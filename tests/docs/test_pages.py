@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from chimera_hpc.cli.main import main, parser
+from chimera_hpc.job.registry import CUT_FIGURES, FIGURES
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -98,6 +99,12 @@ def test_links_and_pictures_of_a_page_exist(page):
     targets = re.findall(r"\]\(([^)\s#]+)[^)]*\)", text)
     files = [target for target in targets if not re.match(r"\w+:", target)]
     assert [target for target in files if not (page.parent / target).exists()] == []
+
+
+def test_gallery_has_every_figure_of_the_registry():
+    text = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    rows = "".join(line.split("|")[1] for line in text.splitlines() if line.startswith("| `"))
+    assert set(re.findall(r"`(\w+)`", rows)) == {*FIGURES, *CUT_FIGURES}
 
 
 def test_every_page_is_in_the_contents():
