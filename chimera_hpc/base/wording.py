@@ -25,3 +25,21 @@ def nearest(name: str, known: list[str]) -> str:
     """Return '; did you mean X?' or, without a similar name, '; known: X, Y, Z'."""
     near = get_close_matches(name[:60], known, n=1)
     return f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}"
+
+
+def in_bytes(size: float) -> str:
+    """Write a number of bytes for people."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"
+
+
+def in_time(seconds: float) -> str:
+    """Write a duration for people."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.3g} h"

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
-from chimera_hpc.job import Sweep
-from chimera_hpc.job.together import points_of
-from chimera_hpc.reduction.cells import FreeAxis, decided_class, free_axes
-from chimera_hpc.store.origin import stored_origin
 
 if TYPE_CHECKING:
     from rich.text import Text
+
+    from chimera_hpc.reduction.cells import FreeAxis
 
 MOST_POINTS = 200_000
 """Beyond this many, a map takes longer to make than one waits for a status."""
@@ -63,6 +61,11 @@ class Cells:
         """Read the cells of a store; None when it has too many points, or is damaged."""
         if int(metadata["attributes"]["n_points"]) > MOST_POINTS:
             return None
+        from chimera_hpc.job import Sweep
+        from chimera_hpc.job.together import points_of
+        from chimera_hpc.reduction.cells import free_axes
+        from chimera_hpc.store.origin import stored_origin
+
         specs = metadata["attributes"]["specs"]
         try:
             origin = stored_origin(store, metadata)
@@ -91,6 +94,8 @@ def _classes(path: Path, n_cells: int) -> list[str | None]:
             return []
         results = json.loads(path.read_bytes())
         if "decide" in results:
+            from chimera_hpc.reduction.cells import decided_class
+
             classes = [decided_class(cell) for cell in results["decide"]["cells"]]
         else:
             cells = next(iter(results["cuts"].values()))["cells"]

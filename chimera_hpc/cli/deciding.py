@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from chimera_hpc.job import Sweep
-from chimera_hpc.job.decide import is_single
+if TYPE_CHECKING:
+    from chimera_hpc.job import Sweep
 
 
 def decide_state(path: Path, metadata: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -57,6 +57,7 @@ def plan_line(sweep: Sweep, store: Path) -> str:
     """
     decide = sweep.decide
     assert decide is not None
+    from chimera_hpc.job.decide import is_single
     from chimera_hpc.run.rounds import grid_cells
 
     n_cells = grid_cells(sweep)

@@ -9,6 +9,7 @@ from pathlib import Path
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.memory import usable_memory
 from chimera_hpc.base.processes import usable_cores
+from chimera_hpc.base.wording import in_bytes
 from chimera_hpc.job import Sweep, block_size
 from chimera_hpc.job.blocks import point_seconds, series_bytes
 from chimera_hpc.store.schema import room
@@ -120,21 +121,3 @@ def free_bytes(folder: Path) -> int | None:
             except OSError:
                 return None
     return None
-
-
-def in_bytes(size: float) -> str:
-    """Write a number of bytes for people."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if size < 1000:
-            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} TB"
-
-
-def in_time(seconds: float) -> str:
-    """Write a duration for people."""
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.3g} h"

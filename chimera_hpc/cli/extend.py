@@ -5,8 +5,9 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import add, errors_in_one_line, load_job, store_path, sweep_folder
+from chimera_hpc.cli.arguments import add, errors_in_one_line, store_path
 from chimera_hpc.cli.estimate import estimate, refuse_absurd
+from chimera_hpc.cli.jobs import load_job, sweep_folder
 
 EPILOG = """examples:
   python -m chimera_hpc.sweep extend jobs/quickstart.toml --set seeds=40

@@ -7,9 +7,11 @@ from argparse import ArgumentParser, Namespace
 import numpy as np
 
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import STORE, add, load_job, sweep_folder
+from chimera_hpc.base.wording import in_bytes, in_time
+from chimera_hpc.cli.arguments import STORE, add
 from chimera_hpc.cli.deciding import plan_line
-from chimera_hpc.cli.estimate import estimate, in_bytes, in_time, memory_lines, refuse_absurd
+from chimera_hpc.cli.estimate import estimate, memory_lines, refuse_absurd
+from chimera_hpc.cli.jobs import load_job, sweep_folder
 from chimera_hpc.cli.run import check_drawing
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.class_names import overridden

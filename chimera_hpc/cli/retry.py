@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.base.wording import nearest, short
-from chimera_hpc.cli.arguments import EXECUTOR, add, executor_of, start_early, store_path, value
+from chimera_hpc.cli.arguments import EXECUTOR, add, store_path, value
 from chimera_hpc.cli.ending import end, interrupted
+from chimera_hpc.cli.jobs import executor_of, start_early
 from chimera_hpc.cli.reporting import load_reduction
 from chimera_hpc.job import Sweep
 from chimera_hpc.job.reading import apply_overrides

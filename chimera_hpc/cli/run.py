@@ -7,19 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.cli.arguments import (
-    EXECUTOR,
-    STORE,
-    add,
-    add_slurm,
-    errors_in_one_line,
-    executor_of,
-    load_job,
-    start_early,
-    sweep_folder,
-)
+from chimera_hpc.cli.arguments import EXECUTOR, STORE, add, add_slurm, errors_in_one_line
 from chimera_hpc.cli.ending import end, interrupted
 from chimera_hpc.cli.estimate import estimate, refuse_absurd
+from chimera_hpc.cli.jobs import executor_of, load_job, start_early, sweep_folder
 from chimera_hpc.cli.reporting import LiveReport, load_reduction
 from chimera_hpc.cli.resubmitting import go_on
 from chimera_hpc.job import Sweep

@@ -12,7 +12,8 @@ import numpy as np
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
-from chimera_hpc.cli.arguments import add, load_job, path_name, store_path, sweep_folder, value
+from chimera_hpc.cli.arguments import add, path_name, store_path, value
+from chimera_hpc.cli.jobs import load_job, sweep_folder
 from chimera_hpc.cli.resubmitting import go_on
 from chimera_hpc.cli.run import open_or_plan
 from chimera_hpc.run.choice import ExecutorChoice

@@ -13,15 +13,9 @@ from numpy.typing import NDArray
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
-from chimera_hpc.cli.arguments import (
-    add,
-    errors_in_one_line,
-    find_points,
-    path_name,
-    store_path,
-    value,
-)
+from chimera_hpc.cli.arguments import add, errors_in_one_line, path_name, store_path, value
 from chimera_hpc.cli.ending import name_of
+from chimera_hpc.cli.jobs import find_points
 from chimera_hpc.network.layout import chosen_layout
 
 if TYPE_CHECKING:

@@ -9,16 +9,8 @@ from typing import TYPE_CHECKING
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.files import write_atomically
-from chimera_hpc.cli.arguments import (
-    STORE,
-    add,
-    add_slurm,
-    flag,
-    load_job,
-    slurm_options_of,
-    sweep_folder,
-    value,
-)
+from chimera_hpc.cli.arguments import STORE, add, add_slurm, flag, value
+from chimera_hpc.cli.jobs import load_job, slurm_options_of, sweep_folder
 from chimera_hpc.cli.run import open_or_plan
 from chimera_hpc.job.tables import Slurm
 from chimera_hpc.run.slurm import queue

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.files import time_at
 from chimera_hpc.base.status import Status
+from chimera_hpc.base.wording import in_time
 from chimera_hpc.cli.arguments import add, flag, store_path
 from chimera_hpc.cli.cell_map import Cells, draw
 from chimera_hpc.cli.deciding import decide_state, state_line
-from chimera_hpc.cli.estimate import in_time
 from chimera_hpc.store.claims import live_claims
 from chimera_hpc.store.ledger import (
     LedgerScan,

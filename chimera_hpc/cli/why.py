@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.exits import Exit
 from chimera_hpc.base.status import Status
-from chimera_hpc.cli.arguments import add, find_points, store_path
+from chimera_hpc.cli.arguments import add, store_path
 from chimera_hpc.cli.ending import name_of
+from chimera_hpc.cli.jobs import find_points
 from chimera_hpc.store.claims import live_claims
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import psutil
 import pytest
 from jobs_for_tests import SMALL, job_text
 
-from chimera_hpc.cli import arguments
+from chimera_hpc.cli import jobs
 from chimera_hpc.cli.main import main
 from chimera_hpc.run import fork_server
 
@@ -117,7 +117,7 @@ def test_commands_that_need_no_workers_start_none(
     def started() -> None:
         raise AssertionError("a fork server was started")
 
-    monkeypatch.setattr(arguments, "start_fork_server", started)
+    monkeypatch.setattr(jobs, "start_fork_server", started)
     assert main(["plan", str(job)]) == 0
     short = ["--set", "integrator.t_end=60", "--set", "features.start=30", "--no-figures"]
     words = ["run", str(job), "--out", str(tmp_path / "out"), *short]
