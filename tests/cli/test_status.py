@@ -233,7 +233,8 @@ def test_map_of_many_cells_is_quick(tmp_path: Path) -> None:
 def test_neither_jobs_nor_models_are_loaded(tmp_path: Path) -> None:
     filled(tmp_path, blocks=1)
     code = "import sys; from chimera_hpc.cli.main import main; "
-    code += "main(['status', sys.argv[1], '--json']); print(*{'pydantic', 'numba', 'chimera_hpc.job'} & set(sys.modules))"
+    code += "main(['status', sys.argv[1], '--json']); "
+    code += "print(*{'pydantic', 'numba', 'chimera_hpc.job'} & set(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", code, tmp_path], check=True, capture_output=True, text=True
     )
