@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import compileall
 import json
 import os
 import shutil
@@ -55,6 +56,8 @@ def main() -> int:
     parser.add_argument("--tiny", action="store_true", help="smallest large points: only to try it")
     parser.add_argument("--points", type=int, default=LARGE, help="points of the large sweep")
     args = parser.parse_args()
+    # As an installation does it: the first command would pay for it, or each where none may write.
+    compileall.compile_dir(FOLDER.parents[1] / "chimera_hpc", quiet=1)
     folder = Path(tempfile.mkdtemp(prefix="chimera-scale-", dir=args.folder))
     try:
         lines = [] if args.only == "large" else measure(folder, args.points)
