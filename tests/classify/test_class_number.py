@@ -60,8 +60,9 @@ def test_equal_points_are_one_state_and_two_values_two() -> None:
     assert class_number(np.vstack([np.zeros((40, 3)), kinds(0, 30)])).n_apart == 0
 
 
-def test_gap_by_hand_of_two_points_a_class() -> None:
-    found = class_number(np.array([[0.0], [0.0], [1.0], [1.0]]))
+@pytest.mark.parametrize("ends", [([0.0], [1.0]), ([0.0, 1.0], [1.0, 0.0])])
+def test_gap_by_hand_of_two_points_a_class(ends: tuple[list[float], list[float]]) -> None:
+    found = class_number(np.repeat(np.array(ends), 2, axis=0))  # each equals its centroid
     assert len(found.gap) == 2
     np.testing.assert_array_equal(found.silhouette, [np.nan, 1.0])
     assert found.gap[1] > found.gap[0] + 100

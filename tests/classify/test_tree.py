@@ -105,6 +105,12 @@ def test_splits_below_name_the_class_that_parts() -> None:
     np.testing.assert_allclose([s.depth for s in splits], [2.0, 1.0])
 
 
+def test_sizes_of_parts_count_leaves_the_larger_first() -> None:
+    grown = tree.grow(np.vstack([LINE, [[12.5, 0, 0]]]), "average")  # 0, 1 | 10, (12, 12.5)
+    splits = tree.splits_below(grown, np.zeros(5, dtype=np.int64), ("all",), until=4)
+    assert [s.sizes for s in splits] == [(3, 2), (2, 1), (1, 1)]
+
+
 @pytest.mark.parametrize("n", [0, 1])
 def test_tree_of_no_or_one_point_has_no_merge(n: int) -> None:
     grown = tree.grow(np.zeros((n, 3)), "ward")

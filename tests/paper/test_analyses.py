@@ -72,6 +72,13 @@ def test_a_block_by_hand() -> None:
     assert sorted(found, key=lambda z: z.imag) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_small_eigenvalue_of_a_stiff_block_keeps_its_digits(sign: float) -> None:
+    # l^2 - sign (2e9 + 1) l + 3e9 = 0, whose small root is 1.5 + 0.75 / 2e9 to 19 digits
+    found = block_eigenvalues(sign * 2.0, 1e-9, sign, np.array([1.0]))[0]
+    assert min(abs(found)) == pytest.approx(1.5 + 0.75 / 2e9, rel=1e-13)
+
+
 def test_distance_of_spectra_looks_both_ways() -> None:
     one, two = np.array([0j, 1j]), np.array([0j])
     assert spectrum_distance(one, two) == spectrum_distance(two, one) == 1.0
