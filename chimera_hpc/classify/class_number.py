@@ -95,11 +95,8 @@ class ClassNumber:
             f"gap statistic {self.by_gap}, silhouette {self.by_silhouette}, "
             f"stability {self.by_stability}"
         )
-        apart = (
-            f"; {self.n_apart} {'lies' if self.n_apart == 1 else 'lie'} apart"
-            if self.n_apart
-            else ""
-        )
+        lie = "lies" if self.n_apart == 1 else "lie"
+        apart = f"; {self.n_apart} {lie} apart" if self.n_apart else ""
         if k == 1:
             return f"{n} of {self.n_runs} {what} look like one state{apart} ({each})"
         return f"{n} of {self.n_runs} {what} look like {k} classes{apart} ({each})"

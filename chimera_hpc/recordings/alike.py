@@ -14,8 +14,8 @@ from chimera_hpc.recordings.file import Recorded
 _UNITS = 8.0
 """Factor between medians of recordings from which units may differ: ms and s, mm and cm."""
 _SAMPLING = 4.0
-"""Factor between sampling steps, or between durations in periods, from which measures differ by it:
-noise of a given size makes V_a of a wave five times as large at a fifth of the step."""
+"""Factor between sampling steps, or between durations in periods, from which measures may differ:
+noise makes more false maxima the finer the step, and few periods scatter more."""
 _NAMED = re.compile(
     r"^times: .*[\[(_ ]([nu\u00b5\u03bc]s|m?s|m?secs?|seconds?|min|minutes?|h|hours?)[\])]?$", re.I
 )
