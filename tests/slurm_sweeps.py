@@ -34,8 +34,9 @@ JOB = SMALL | {
 """64 points."""
 
 
-LONG = 4000.0
-"""Time of runs that let a sweep last for some three seconds on two cores."""
+LONG = 12_000.0
+"""Time of runs that let a sweep last for five to ten seconds on two cores: a signal that is sent
+after the first points comes before the last ones."""
 
 
 def write_job(

@@ -58,6 +58,12 @@ def memory_size(text: str) -> str:
     return found[1].upper()
 
 
+def bytes_of(size: str) -> int:
+    """Return the bytes of a size as SLURM writes it, where 800 means 800M."""
+    unit = size[-1] if size[-1] in "KMGT" else "M"
+    return int(size.rstrip("KMGT")) << 10 * ("KMGT".index(unit) + 1)
+
+
 def flag(text: str) -> dict[str, Any]:
     """Return an option without a value, as `ArgumentParser.add_argument` takes it."""
     return {"action": "store_true", "help": text}

@@ -10,6 +10,7 @@ from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.memory import usable_memory
 from chimera_hpc.base.processes import usable_cores
 from chimera_hpc.base.wording import in_bytes
+from chimera_hpc.cli.arguments import bytes_of
 from chimera_hpc.job import Sweep, block_size
 from chimera_hpc.job.blocks import point_seconds, series_bytes
 from chimera_hpc.store.schema import room
@@ -87,6 +88,19 @@ def memory_lines(need: Estimate) -> list[str]:
         advice = f"--workers {fit}" if fit else "a shorter analysis interval or fewer nodes"
         lines.append(f"warning: there are {in_bytes(here)} of memory here; run with {advice}")
     return lines
+
+
+def refuse_small_memory(sweep: Sweep, size: str | None) -> None:
+    """Raise BadInput when `--mem` is below half of what a worker takes."""
+    if size is None:
+        return
+    points = sweep.points()
+    need = worker_bytes(sweep, len(points), block_size(sweep, len(points)))
+    if bytes_of(size) < need / 2:
+        raise BadInput(
+            f"--mem {size}: a worker of {sweep.name} takes about {in_bytes(need)}; "
+            f"at least half of that is needed"
+        )
 
 
 def refuse_absurd(sweep: Sweep, need: Estimate, folder: Path, yes: bool) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.cli.arguments import EXECUTOR, STORE, add, add_slurm, errors_in_one_line
 from chimera_hpc.cli.ending import end, interrupted
-from chimera_hpc.cli.estimate import estimate, refuse_absurd
+from chimera_hpc.cli.estimate import estimate, refuse_absurd, refuse_small_memory
 from chimera_hpc.cli.jobs import executor_of, load_job, start_early, sweep_folder
 from chimera_hpc.cli.reporting import LiveReport, load_reduction
 from chimera_hpc.cli.resubmitting import go_on
@@ -44,6 +44,8 @@ def execute(args: Namespace) -> int:
             sweep = load_job(args.job, args.overrides, args.block)
             folder = sweep_folder(args.out, sweep, args.job)
             executor = executor_of(args, sweep, folder / STORE)
+            if args.cluster in ("local", "slurm"):
+                refuse_small_memory(sweep, args.mem)
             store = open_or_plan(folder, sweep, args.yes)
             from chimera_hpc.run.messages import RetryPolicy
 

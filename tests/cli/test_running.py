@@ -18,6 +18,7 @@ import pytest
 from jobs_for_tests import SMALL, job_text
 
 from chimera_hpc.base.status import Status
+from chimera_hpc.cli.arguments import bytes_of
 from chimera_hpc.cli.estimate import LANES_PER_SAMPLE, MOST_SIDE_BY_SIDE, worker_bytes
 from chimera_hpc.integrate import lanes
 from chimera_hpc.job import Points, Sweep
@@ -392,6 +393,25 @@ def test_plan_says_what_workers_take_and_how_many_fit(
     assert "warning" not in out
     monkeypatch.setattr("chimera_hpc.cli.estimate.usable_memory", lambda: 5 * 10**8)
     assert "warning: there are 500 MB of memory here; run with --workers 2" in sweep(*words)[1]
+
+
+def test_memory_in_which_no_worker_can_run_is_refused(
+    job: Path, tmp_path: Path, sweep: Run
+) -> None:
+    words = ("run", job, "--out", tmp_path / "out", "--no-figures", "--mem")
+    code, _, err = sweep(*words, "50M")
+    assert code == 2
+    assert re.search(r"--mem 50M: a worker of \w+ takes about (19|2\d)\d MB; at least half", err)
+    assert not (tmp_path / "out").exists()
+    # A worker, not this process, has the limit.
+    assert sweep(*words, "50M", "--cluster", "serial")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("size", "bytes_"), [("800", 800 * 2**20), ("3K", 3072), ("2G", 2**31), ("1T", 2**40)]
+)
+def test_sizes_are_read_as_slurm_reads_them(size: str, bytes_: int) -> None:
+    assert bytes_of(size) == bytes_
 
 
 def test_memory_of_a_worker_counts_samples_and_points() -> None:

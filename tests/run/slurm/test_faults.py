@@ -131,7 +131,8 @@ def test_an_array_element_that_failed_is_submitted_again(
     words = ("slurm", job, "--out", out, "--mode", "array", "--no-reduce", "--submit")
     number = sweep(*words).stdout.split()[2]
     wait_for_points(out, 4, slurm)
-    slurm.sh("scancel", "--signal=11", "--full", f"{number}_1")
+    # scancel itself may die of SIGPIPE when the element ends before it has answered.
+    slurm.sh("scancel", "--signal=11", "--full", f"{number}_1", check=False)
     slurm.wait()
     assert slurm.told(f"{number}_1", "JobState") == "FAILED"
     before = rows_done(out)
