@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize_scalar
+from scipy.special import log_expit
 
 from chimera_hpc.classify.crossing import crossing
 
@@ -35,3 +37,22 @@ def test_interval_holds_about_as_often_as_stated():
         _, low, high = crossing(X, n - above, above, 0.95)
         held += low <= 66.0 <= high
     assert held >= 91  # 95 % of 100 less two standard deviations
+
+
+def test_ends_are_where_twice_the_loss_of_likelihood_is_the_quantile_of_chi_squared():
+    share = 1 / (1 + np.exp(-(X - 68.0) / 9.0))
+    above = np.round(40 * share)
+
+    def loss(place: float) -> float:
+        def of_slope(log_slope: float) -> float:
+            z = np.exp(log_slope) * (X - place)
+            return -float(above @ log_expit(z) + (40 - above) @ log_expit(-z))
+
+        return float(minimize_scalar(of_slope, bounds=(-6.0, 3.0), method="bounded").fun)
+
+    best = minimize_scalar(loss, bounds=(50.0, 90.0), method="bounded")
+    ends = [
+        brentq(lambda x: 2 * (loss(x) - best.fun) - 3.841, *sorted((best.x, far)))
+        for far in (50.0, 90.0)
+    ]
+    assert crossing(X, 40 - above, above, 0.95)[1:] == pytest.approx(ends, abs=0.3)

@@ -107,3 +107,8 @@ def test_expectation_is_near_what_cells_then_take():
         taken += 5 * int(open_.sum())
     assert expected == pytest.approx(taken, rel=0.35)
     assert expected_runs(votes((5, 0, 0)), SIZES, 0.95, 5, 100) == 0.0
+
+
+def test_no_more_runs_are_expected_than_a_cell_may_have():
+    # Two votes more cannot decide a tie of seven.
+    assert expected_runs(votes((7, 7, 0)), SIZES, 0.95, 5, 16) == 2.0

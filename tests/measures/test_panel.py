@@ -129,6 +129,14 @@ def test_h0_relative_to_the_largest_correlation_or_not() -> None:
     assert measures.h0(u, relative=False) == 0.0
 
 
+def test_node_without_neighbours_has_an_order_only_with_itself() -> None:
+    phase = np.array([[0.0, np.pi / 2, 2.0]])
+    with_itself = measures.local_order(phase, [[0, 1]])
+    np.testing.assert_allclose(with_itself, [[np.sqrt(0.5), np.sqrt(0.5), 1.0]])
+    others = measures.local_order(phase, [[0, 1]], itself=False)
+    np.testing.assert_allclose(others, [[1.0, 1.0, np.nan]])
+
+
 @pytest.mark.parametrize("turns", [0, 1, 3, 8])
 def test_local_order_of_a_plane_wave(turns: int) -> None:
     q = 2 * np.pi * turns / 16
@@ -166,6 +174,7 @@ def test_phase_velocity_of_a_plateau_and_an_arc() -> None:
     assert counted.round(9).tolist() == [7, 7, 7, 10, -12, 7]
     assert measures.plateau(found) == 4 / 6
     assert measures.plateau(found, width=0.0) == 3 / 6
+    assert measures.plateau(-found) == 4 / 6  # whichever way phases turn
 
 
 def test_adaptive_coherence_equals_its_twin() -> None:

@@ -77,6 +77,20 @@ def test_frequencies_belong_to_the_seed(name):
 
 
 @pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("kuramoto_sakaguchi", {"coupling": 0.3, "phase_lag": 0.7}),
+        ("stuart_landau", {"coupling": 0.3, "phase_lag": 0.7, "growth": 1.2, "shear": 0.4}),
+        ("networked_fhn", {"sigma": 0.3, "epsilon": 0.07, "b": 0.6, "phi": 1.1}),
+    ],
+)
+def test_numbers_of_a_job_are_those_of_the_model(name, numbers):
+    job = sweep(name, **numbers)
+    model = build(job, job.points().row(0))
+    assert {key: getattr(model, key) for key in numbers} == numbers
+
+
+@pytest.mark.parametrize(
     ("rewire", "kernel"), [(0.0, "sliding sums"), (0.5, "sparse rows, 48 entries")]
 )
 def test_plan_says_how_a_slope_is_computed(tmp_path, capsys, rewire, kernel):

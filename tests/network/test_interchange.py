@@ -227,6 +227,12 @@ def test_parts_saved_by_numpy_are_read(tmp_path: Path) -> None:
     same(Network.from_file(tmp_path / "a.npz"), network)
 
 
+def test_links_saved_by_numpy_have_directions_if_asked_for(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", links=[[0, 1], [1, 0], [1, 2]])
+    network = Network.from_file(tmp_path / "a.npz", directed=True)
+    assert network.adjacency.toarray().tolist() == [[0, 1, 0], [1, 0, 0], [0, 1, 0]]
+
+
 def test_lists_of_names_are_numbered_as_they_appear(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("# a comment\nlondon;paris\nparis;rome # another\n\n")

@@ -92,6 +92,19 @@ def test_nothing_is_begun_when_the_time_is_over() -> None:
     assert not hours.fits(_Store(), np.arange(1))
 
 
+@pytest.mark.parametrize(("left", "spared"), [(100.0, 10.0), (86400.0, 60.0)])
+def test_a_tenth_of_a_short_job_and_a_minute_of_a_long_one_are_spared(
+    left: float, spared: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    end = int(time.time() + left)
+    monkeypatch.setenv("SLURM_JOB_ID", "1")
+    monkeypatch.setenv("SLURM_JOB_END_TIME", str(end))
+    monkeypatch.delenv(walltime.DRAIN, raising=False)
+    hours = walltime.this_job.__wrapped__()
+    assert hours is not None
+    assert end - hours.leave_by == pytest.approx(spared, abs=1.0)
+
+
 @pytest.mark.parametrize(
     ("text", "seconds"),
     [("4:59", 299), ("1:00:00", 3600), ("2-00:00:01", 172801), ("UNLIMITED", None), ("0:00", 0)],
