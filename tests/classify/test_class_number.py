@@ -11,7 +11,7 @@ from sklearn.metrics import adjusted_rand_score
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.classify import tree
-from chimera_hpc.classify.class_number import class_number
+from chimera_hpc.classify.class_number import ClassNumber, class_number
 from chimera_hpc.classify.classification import classify
 from chimera_hpc.classify.classifiers import OTHERS, Classifier, labels_by
 
@@ -66,6 +66,13 @@ def test_gap_by_hand_of_two_points_a_class(ends: tuple[list[float], list[float]]
     assert len(found.gap) == 2
     np.testing.assert_array_equal(found.silhouette, [np.nan, 1.0])
     assert found.gap[1] > found.gap[0] + 100
+
+
+@pytest.mark.parametrize(("error", "answer"), [([0.0, 0.2, 0.0], 1), ([0.2, 0.0, 0.0], 2)])
+def test_gap_of_the_next_number_counts_less_its_own_error(error: list[float], answer: int) -> None:
+    rest = np.array([np.nan, 0.5, 0.5])
+    found = ClassNumber(np.array([1.0, 1.1, 0.9]), np.array(error), rest, rest, 20, 0)
+    assert found.by_gap == answer
 
 
 @pytest.mark.parametrize("classifier", OTHERS)

@@ -47,6 +47,7 @@ def test_steady_runs_decide_only_where_no_run_has_a_class() -> None:
 
 def test_a_single_run_has_no_bootstrap() -> None:
     assert np.isnan(kept([[1, 0, 0, 0]], [1, 1])[0])
+    assert kept([[2, 0, 0, 0]], [2, 1])[0] == 1.0
 
 
 def test_labels_are_compared_where_both_are_known() -> None:

@@ -296,3 +296,11 @@ def test_cells_of_many_columns_are_exact_where_the_product_of_their_values_excee
     expected = [numbers.setdefault(tuple(row), len(numbers)) for row in rows.tolist()]
     assert cell_id.tolist() == expected
     assert list(zip(*(cells[name].tolist() for name in columns), strict=True)) == [*numbers]
+
+
+def test_cells_that_differ_in_the_first_of_65_columns_only_are_two():
+    # As digits of a binary number, the first column would be worth 2**64.
+    rows = np.vstack([np.zeros(65, np.int64), np.eye(65, dtype=np.int64)])
+    columns = {f"x{i}": np.ascontiguousarray(rows[:, i]) for i in range(65)}
+    points = Points({**columns, "seed": np.zeros(66, np.int64)}, (*columns, "seed"))
+    assert points.cells()[0].tolist() == list(range(66))

@@ -224,6 +224,23 @@ def test_held_values_of_any_object() -> None:
     assert {name for name in one if one[name] != changed[name]} >= {"Kind"}
 
 
+def test_held_values_of_defaults_by_position_and_by_name() -> None:
+    def with_defaults(first: float, second: float) -> object:
+        def slope(x: float, a: float = first, *, b: float = second) -> float:
+            return a * x + b
+
+        class Kind:
+            build = staticmethod(slope)
+
+        return Kind()
+
+    one, *others = (
+        held_values(with_defaults(*x), "") for x in ((1.0, 2.0), (3.0, 2.0), (1.0, 4.0))
+    )
+    for other in others:
+        assert {name for name in one if one[name] != other[name]}
+
+
 def test_packages_that_a_model_imports_are_recorded_with_their_versions(tmp_path: Path) -> None:
     job = write(tmp_path / "a", before="def f():\n    import scipy.sparse")
     import scipy

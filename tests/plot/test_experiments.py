@@ -22,6 +22,7 @@ from chimera_hpc.plot.agreement import (
 )
 from chimera_hpc.plot.atlas import Diamonds, atlas
 from chimera_hpc.plot.basin import basin
+from chimera_hpc.plot.boundaries import boundaries
 from chimera_hpc.plot.class_number import class_number
 from chimera_hpc.plot.density import Density, density_classes
 from chimera_hpc.plot.incoherence import Strengths, incoherence
@@ -49,6 +50,22 @@ def test_basin_shows_fraction_over_half_degree_and_radius(rendered: Render) -> N
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$P$", "radius $R$")
     assert bar.get_ylabel() == "$f = N'/N$"
     np.testing.assert_array_equal(axes.lines[0].get_ydata(), [0.2, 0.1, np.nan])
+
+
+def test_boundaries_over_a_plane_are_bars_along_their_axis(rendered: Render) -> None:
+    cells = [
+        {"class": name, "decided": True, "P": P, "Q": Q}
+        for P, Q, name in ((4, 1, "ordered"), (8, 1, "chimera"), (4, 5, "chimera"))
+    ]
+    axes = [(f"${name}$", np.array([float(cell[name]) for cell in cells])) for name in ("P", "Q")]
+    found = [
+        {"axis": "P", "Q": 1, "at": 6.0, "interval": [4.0, 8.0]},
+        {"axis": "Q", "P": 4, "at": 3.0, "interval": [1.0, 5.0]},
+    ]
+    figure = rendered(boundaries(axes, cells, found, {"P": 0, "Q": 1}))
+    bars = [bar for container in figure.axes[0].containers for bar in container[2]]
+    ends = [bar.get_segments()[0].tolist() for bar in bars]
+    assert ends == [[[4.0, 1.0], [8.0, 1.0]], [[4.0, 1.0], [4.0, 5.0]]]
 
 
 def test_robustness_draws_teal_dots_and_green_stars_with_bands(rendered: Render) -> None:
