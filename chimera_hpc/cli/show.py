@@ -21,6 +21,8 @@ from chimera_hpc.network.layout import chosen_layout
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from chimera_hpc.plot.indicators import IndicatorProfiles
+    from chimera_hpc.plot.spacetime import PanelRasters
     from chimera_hpc.reduction.replay import Replay
     from chimera_hpc.store.store import Store
 
@@ -75,24 +77,23 @@ def execute(args: Namespace) -> int:
         check_film(args.animate)
     first = representative(store, chosen) if len(chosen) > 1 else chosen[0]
     shown = sorted({first, *[i for i in chosen if i != first][: _SIDE_BY_SIDE - 1]})
-    runs = replay(store, shown, first)
-    for run in runs:
-        _tell(store, run)
-    if len(chosen) > len(runs):
-        print(f"{len(runs)} of {len(chosen)} seeds shown")
-    focus = next(run for run in runs if run.point == first)
-    if len(runs) > 1:
+    made = _Pictures(store, first, len(shown))
+    for run in replay(store, shown, first):
+        made.add(run)
+        del run  # or it would stay in memory while the next one is computed
+    focus = made.in_focus()
+    if len(chosen) > len(shown):
+        print(f"{len(shown)} of {len(chosen)} seeds shown")
+    if len(shown) > 1:
         print(f"portrait and spectrum: {name_of(store, first)}")
     folder = args.out or path.parent / "figures" / "show"
-    stem = _stem(store, first, len(runs) == 1)
-    figures = _figures(store, runs, focus, node, args.window)
+    figures = made.figures() | _figures_of_one(store, focus, node, args.window)
     figures |= _network_figure(store, focus, layout)
-    for made in _save(figures, folder, stem):
-        print(f"written: {made}")
+    for written in _save(figures, folder, _stem(store, first, len(shown) == 1)):
+        print(f"written: {written}")
     if args.animate is not None:
         _animate(store, focus, args.animate, args.periods, layout)
-    good = all(run.is_same or run.stored is None for run in runs)
-    return Exit.COMPLETE if good else Exit.FAILURES
+    return Exit.COMPLETE if made.is_good else Exit.FAILURES
 
 
 def _one_cell(store: Store, chosen: list[int]) -> None:
@@ -148,35 +149,72 @@ def _stem(store: Store, point: int, with_seed: bool) -> str:
     return re.sub(r"[^\w.+-]", "", "_".join(words).replace("=", "")) or "cell"
 
 
-def _figures(
-    store: Store, runs: list[Replay], focus: Replay, node: int, window: int
-) -> dict[str, Figure]:
-    """Draw the signals of runs; portrait and spectrum are those of the run in focus."""
+class _Pictures:
+    """What is drawn of all runs: panels and profiles, made of one run at a time.
+
+    Only the run in focus stays in memory as a whole.
+    """
+
+    def __init__(self, store: Store, first: int, count: int) -> None:
+        from chimera_hpc.reduction.runs import drawn_network
+
+        self.store, self.first, self.count = store, first, count
+        self.network = drawn_network(store.sweep, store.points.row(first), print)
+        self.focus: Replay | None = None
+        self.is_good = True
+        self.panels: list[tuple[str, PanelRasters]] = []
+        self.profiles: list[tuple[str, IndicatorProfiles]] = []
+
+    def add(self, run: Replay) -> None:
+        """Tell of a run, and keep what is drawn of it."""
+        from chimera_hpc.plot.indicators import profiles_of, variations_text
+        from chimera_hpc.plot.ordered import in_order
+        from chimera_hpc.plot.spacetime import panel_rasters
+
+        _tell(self.store, run)
+        self.is_good &= run.is_same or run.stored is None
+        if run.begins:
+            u = in_order(run.u, self.network, self.store.sweep.signals)
+            self.panels.append((run.title, panel_rasters(run.t, u, self.count)))
+        if run.n_windows:
+            title = f"{run.title}\n{variations_text(run.triplet)}"
+            self.profiles.append((title, profiles_of(run.features)))
+        if run.point == self.first:
+            self.focus = run
+
+    def in_focus(self) -> Replay:
+        """Return the run in focus, once it was added."""
+        assert self.focus is not None
+        return self.focus
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw the runs that begin, and the profiles of those with windows."""
+        from chimera_hpc.plot.indicators import fourier_indicators
+        from chimera_hpc.plot.spacetime import draw_panels
+
+        made: dict[str, Figure] = {}
+        signals = self.store.sweep.signals
+        if self.panels:
+            titles, panels = zip(*self.panels, strict=True)
+            made["space_time"] = draw_panels(panels, titles, signals=signals)
+        if self.profiles:
+            titles, profiles = zip(*self.profiles, strict=True)
+            made["profiles"] = fourier_indicators(profiles, titles, signals=signals)
+        return made
+
+
+def _figures_of_one(store: Store, focus: Replay, node: int, window: int) -> dict[str, Figure]:
+    """Draw the portrait and the spectrum of the run in focus."""
     from chimera_hpc.plot import style
-    from chimera_hpc.plot.indicators import fourier_indicators, profiles_of, variations_text
-    from chimera_hpc.plot.ordered import in_order
     from chimera_hpc.plot.portrait import ring_portrait
-    from chimera_hpc.plot.spacetime import space_time
     from chimera_hpc.plot.spectrum import spectrum
     from chimera_hpc.reduction.replay import has_nullcline, window_spectrum
-    from chimera_hpc.reduction.runs import drawn_network
 
     figures: dict[str, Figure] = {}
     signals = store.sweep.signals
-    network = drawn_network(store.sweep, store.points.row(focus.point), print)
     # Pictures of another node or window than the default are files of their own.
     at_window = f"-window{window}" if window else ""
     at_node = "" if node == store.sweep.features.reference_node else f"-node{node}"
-    seen = [run for run in runs if run.begins]
-    if seen:
-        panels = [(run.t, in_order(run.u, network, signals)) for run in seen]
-        figures["space_time"] = space_time(panels, [run.title for run in seen], signals=signals)
-    measured = [run for run in runs if run.n_windows]
-    if measured:
-        titles = [f"{run.title}\n{variations_text(run.triplet)}" for run in measured]
-        figures["profiles"] = fourier_indicators(
-            [profiles_of(run.features) for run in measured], titles, signals=signals
-        )
     if focus.is_whole:
         end = slice(-len(focus.w), None)
         figures[f"portrait{at_node}"] = ring_portrait(

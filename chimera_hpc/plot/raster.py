@@ -63,6 +63,8 @@ class Raster:
     """Nodes from a row to the next."""
     length: str = ""
     """The part of the series that a close-up shows, in words."""
+    periods: tuple[float, float] | None = None
+    """What `n_periods` returns of the series, where it was asked for."""
 
     @property
     def partly(self) -> str:
@@ -72,19 +74,23 @@ class Raster:
         return "" if self.is_whole else f"nodes {self.nodes[0]} to {self.nodes[1] - 1}"
 
 
+@dataclass(frozen=True)
+class _FewNodes:
+    """What a few nodes, equally spaced, say about a series."""
+
+    periods: tuple[float, float]
+    """As `n_periods` returns them."""
+    low: Array
+    high: Array
+    """(nodes, dots) smallest and largest u from each dot to the first sample of the next."""
+
+
 def n_periods(u: NodeSeries) -> tuple[float, float]:
     """Return the number of periods of a slow and of a fast node, from crossings of the mid-level.
 
     These are the quantiles 0.1 and 0.75 over the nodes that oscillate; 0 if no node does.
     """
-    rows = _some(u)
-    low, high = np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
-    above = rows > 0.5 * (low + high)[:, None]
-    crossings = np.count_nonzero(above[:, 1:] != above[:, :-1], axis=1)
-    largest = np.nanmax(np.abs([low, high]), initial=0.0)
-    moving = crossings[high - low > _FLAT * largest]
-    slow, fast = np.quantile(0.5 * moving, (0.1, 0.75)) if len(moving) else (0.0, 0.0)
-    return float(slow), float(fast)
+    return _few_nodes(u, 1).periods
 
 
 def overview(t: ArrayLike, u: NodeSeries, dots: int = COLUMNS) -> Raster:
@@ -93,12 +99,14 @@ def overview(t: ArrayLike, u: NodeSeries, dots: int = COLUMNS) -> Raster:
     The picture cannot resolve u that jumps within many of the `dots` along time. The same holds if
     the ring has more nodes than the picture has rows, and neighbours differ all around the ring.
     """
-    time, slow = np.asarray(t, dtype=np.float64), n_periods(u)[0]
-    stride = -(-u.shape[0] // ROWS)
-    if slow < 1.0 or (_is_slow(u, dots) and (stride == 1 or _is_smooth(u, stride))):
-        return stretch(time, u, float(time[-1] - time[0]), stride=stride)
+    time, few = np.asarray(t, dtype=np.float64), _few_nodes(u, dots)
+    slow, stride = few.periods[0], -(-u.shape[0] // ROWS)
+    if slow < 1.0 or (_is_slow(few) and (stride == 1 or _is_smooth(u, stride))):
+        made = stretch(time, u, float(time[-1] - time[0]), stride=stride)
+        return replace(made, periods=few.periods)
     low, high = envelope(u, ROWS, min(COLUMNS, int(slow)))
-    return Raster(high - low, _edges(time), (0, u.shape[0]), is_range=True)
+    nodes, is_range = (0, u.shape[0]), True
+    return Raster(high - low, _edges(time), nodes, is_range=is_range, periods=few.periods)
 
 
 def close_up(
@@ -107,13 +115,15 @@ def close_up(
     rows: int = ROWS,
     columns: int = COLUMNS,
     shown: int = PERIODS,
+    counted: tuple[float, float] | None = None,
 ) -> Raster:
     """Return u over the last periods, at most over half of the series.
 
     If the ring has more nodes than rows, equally spaced nodes are shown if neighbours are alike in
-    a part of the ring. Otherwise the first nodes are shown.
+    a part of the ring. Otherwise the first nodes are shown. `counted` is what `n_periods` returns,
+    if it is known.
     """
-    time, periods = np.asarray(t, dtype=np.float64), n_periods(u)[1]
+    time, periods = np.asarray(t, dtype=np.float64), (counted or n_periods(u))[1]
     share = min(0.5, shown / max(periods, shown))
     stride = -(-u.shape[0] // rows)
     if stride > _MOST_STRIDE or (stride > 1 and not _is_smooth(u, stride)):
@@ -137,7 +147,7 @@ def stretch(
     step = -(-count // columns)
     times = slice((len(time) - 1) % step + (len(time) - count) // step * step, None, step)
     n = min(u.shape[0], rows * stride)
-    values = np.array(u[0:n:stride][:, times])
+    values = np.concatenate([block[:, times] for block in _every(u, stride, n)])
     return Raster(values, _edges(time[times]), (0, n), n == u.shape[0], stride=stride)
 
 
@@ -172,17 +182,41 @@ def _edges(time: Array) -> tuple[float, float]:
     return float(time[0]) - half, float(time[-1]) + half
 
 
-def _some(u: NodeSeries) -> Array:
-    return u[:: max(1, -(-u.shape[0] // _SOME_NODES))]
+def _every(u: NodeSeries, stride: int, end: int) -> Iterator[Array]:
+    """Yield u of every `stride`-th node before `end`, about `_PIECE` samples at a time."""
+    nodes = stride * max(1, _PIECE // max(1, u.shape[1]))
+    for first in range(0, end, nodes):
+        yield u[first : min(first + nodes, end) : stride]
 
 
-def _is_slow(u: NodeSeries, dots: int) -> bool:
-    """Whether u changes by more than half of its range within few of the `dots` along time."""
-    rows = _some(u)
-    low, high = envelope(rows, len(rows), dots)
+def _few_nodes(u: NodeSeries, dots: int) -> _FewNodes:
+    low, high, crossings, dot_low, dot_high = zip(
+        *(_ranges(rows, dots) for rows in _every(u, -(-u.shape[0] // _SOME_NODES), u.shape[0])),
+        strict=True,
+    )
+    ranges = np.array([np.concatenate(low), np.concatenate(high)])
+    largest = np.nanmax(np.abs(ranges), initial=0.0)
+    moving = np.concatenate(crossings)[ranges[1] - ranges[0] > _FLAT * largest]
+    slow, fast = np.quantile(0.5 * moving, (0.1, 0.75)) if len(moving) else (0.0, 0.0)
+    periods = (float(slow), float(fast))
+    return _FewNodes(periods, np.concatenate(dot_low), np.concatenate(dot_high))
+
+
+def _ranges(rows: Array, dots: int) -> tuple[Array, Array, NDArray[np.int64], Array, Array]:
+    """Return the range of rows (n, T), the crossings of its middle, and the range in each dot."""
+    low, high = np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
+    above = rows > 0.5 * (low + high)[:, None]
+    crossings = np.count_nonzero(above[:, 1:] != above[:, :-1], axis=1)
+    dot_low, dot_high = envelope(rows, len(rows), dots)
     following = rows[:, bins(rows.shape[1], dots)[1:]]
-    low[:, :-1] = np.fmin(low[:, :-1], following)
-    high[:, :-1] = np.fmax(high[:, :-1], following)
+    dot_low[:, :-1] = np.fmin(dot_low[:, :-1], following)
+    dot_high[:, :-1] = np.fmax(dot_high[:, :-1], following)
+    return low, high, crossings, dot_low, dot_high
+
+
+def _is_slow(few: _FewNodes) -> bool:
+    """Whether u changes by more than half of its range within few of the dots along time."""
+    low, high = few.low, few.high
     whole = high.max(axis=1, keepdims=True) - low.min(axis=1, keepdims=True)
     moving = whole[:, 0] > _FLAT * np.nanmax(np.abs([low, high]))
     return bool(np.mean((high - low > 0.5 * whole)[moving]) <= _JUMPS)
@@ -191,6 +225,10 @@ def _is_slow(u: NodeSeries, dots: int) -> bool:
 def _is_smooth(u: NodeSeries, stride: int) -> bool:
     """Whether u is alike at `stride` neighbouring nodes in at least a fifth of the ring."""
     size = min(stride, _SOME_NODES)
-    groups = np.stack([u[i : i + size] for i in bins(u.shape[0] - size + 1, _GROUPS).tolist()])
-    differences = np.ptp(groups, axis=1).mean(axis=-1)
-    return bool(np.quantile(differences, 0.2) <= _SMOOTH * np.ptp(groups))
+    differences, low, high = [], [], []
+    for i in bins(u.shape[0] - size + 1, _GROUPS).tolist():
+        group = u[i : i + size]
+        differences.append(np.ptp(group, axis=0).mean())
+        low.append(group.min())
+        high.append(group.max())
+    return bool(np.quantile(differences, 0.2) <= _SMOOTH * (np.max(high) - np.min(low)))

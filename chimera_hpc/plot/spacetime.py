@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,32 @@ Panel = tuple[ArrayLike, NodeSeries]
 
 _DOTS = 1000
 """Dots over the width of a page."""
+_COLUMNS = 3
+"""Most panels side by side."""
+
+
+@dataclass(frozen=True)
+class PanelRasters:
+    """What is drawn of one run: a small part of its series, which is not needed any more."""
+
+    overview: Raster
+    close_up: Raster | None
+    """Drawn if the overview of any run is coarse."""
+    is_ordered: bool = False
+    """Whether rows are in the order of a network."""
+    bounds: tuple[int, ...] = ()
+    """Rows at which another community begins."""
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the overview does not show every node and oscillation."""
+        return self.overview.is_range or bool(self.overview.partly)
+
+
+def panel_rasters(t: ArrayLike, u: NodeSeries, count: int) -> PanelRasters:
+    """Return what `draw_panels` draws of t (T,), uniform, and u (N, T), one run of `count`."""
+    upper = overview(t, u, _DOTS // _columns(count))
+    return _rasters(u, upper, close_up(t, u, counted=upper.periods))
 
 
 def space_time_figure(data: FigureInput) -> Figure | None:
@@ -39,12 +66,11 @@ def _of_runs(runs: Sequence[DrawnRun]) -> Figure:
     return space_time(panels, [run.title for run in runs], signals=runs[0].signals)
 
 
-@style.styled
 def space_time(
     panels: Sequence[Panel],
     titles: Sequence[str] = (),
     *,
-    columns: int = 3,
+    columns: int = _COLUMNS,
     symbol: str = "u_i(t)",
     names: Sequence[str] = (),
     signals: str = "nodes",
@@ -56,10 +82,31 @@ def space_time(
     label their axis. The default is their numbers from 0. `signals` says where u lives, "nodes",
     "links" or "triangles". Of `OrderedRows`, lines show where another community begins.
     """
-    columns = 2 if len(panels) == 4 and columns > 2 else min(columns, len(panels))
-    upper = [overview(t, u, _DOTS // columns) for t, u in panels]
-    coarse = any(raster.is_range or raster.partly for raster in upper)
-    lower = [close_up(t, u) for t, u in panels] if coarse else []
+    dots = _DOTS // _columns(len(panels), columns)
+    made = [_rasters(u, overview(t, u, dots)) for t, u in panels]
+    if any(panel.is_coarse for panel in made):
+        near = [
+            close_up(t, u, counted=panel.overview.periods)
+            for (t, u), panel in zip(panels, made, strict=True)
+        ]
+        made = [replace(panel, close_up=raster) for panel, raster in zip(made, near, strict=True)]
+    return draw_panels(made, titles, columns, symbol, names, signals)
+
+
+@style.styled
+def draw_panels(
+    panels: Sequence[PanelRasters],
+    titles: Sequence[str] = (),
+    columns: int = _COLUMNS,
+    symbol: str = "u_i(t)",
+    names: Sequence[str] = (),
+    signals: str = "nodes",
+) -> Figure:
+    """Draw one panel for each run, as `space_time` does."""
+    columns = _columns(len(panels), columns)
+    upper = [panel.overview for panel in panels]
+    coarse = any(panel.is_coarse for panel in panels)
+    lower = [panel.close_up for panel in panels if panel.close_up is not None and coarse]
     rows, parts = -(-len(panels) // columns), 2 if coarse else 1
     width = style.PAGE if columns > 1 else style.COLUMN + 1.2
     figure = style.new_figure(width, 0.35 + (2.05 if coarse else 1.95) * rows * parts)
@@ -76,8 +123,8 @@ def space_time(
             axes[row + 1, column].set_title(lower[i].length, loc="left", fontsize="small")
             draw_raster(axes[row + 1, column], lower[i], scales[False], names)
         for frame, raster in zip(axes[row:, column], (upper[i], *lower[i : i + 1]), strict=False):
-            _draw_bounds(frame, panels[i][1], raster)
-    ordered = any(isinstance(u, OrderedRows) for _, u in panels)
+            _draw_bounds(frame, panels[i].bounds, raster)
+    ordered = any(panel.is_ordered for panel in panels)
     for left in axes[:, 0]:
         left.set_ylabel("node" if names else style.signal_label(signals, ordered))
     for i, (row, column) in enumerate(place):
@@ -112,9 +159,19 @@ def draw_raster(axes: Axes, raster: Raster, largest: float, names: Sequence[str]
     return image
 
 
-def _draw_bounds(axes: Axes, u: NodeSeries, raster: Raster) -> None:
+def _columns(count: int, most: int = _COLUMNS) -> int:
+    """Return how many of `count` panels are side by side."""
+    return 2 if count == 4 and most > 2 else min(most, count)
+
+
+def _rasters(u: NodeSeries, upper: Raster, lower: Raster | None = None) -> PanelRasters:
+    is_ordered = isinstance(u, OrderedRows)
+    return PanelRasters(upper, lower, is_ordered, u.bounds if isinstance(u, OrderedRows) else ())
+
+
+def _draw_bounds(axes: Axes, bounds: Sequence[int], raster: Raster) -> None:
     """Draw a line where another community begins."""
-    for bound in u.bounds if isinstance(u, OrderedRows) else ():
+    for bound in bounds:
         if bound < raster.nodes[1]:
             axes.axhline(bound - 0.5, color="white", linewidth=0.7)
 

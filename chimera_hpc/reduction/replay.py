@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,19 +84,32 @@ class Replay:
         return 1.0 / frequency if frequency > 0.0 else float("nan")
 
 
-def replay(store: Store, chosen: Sequence[int], focus: int | None = None) -> list[Replay]:
-    """Compute points of a store again; their bits do not depend on one another.
+def replay(store: Store, chosen: Sequence[int], focus: int | None = None) -> Iterator[Replay]:
+    """Yield points of a store, computed again; their bits do not depend on one another.
 
-    Large ones are computed one after the other, so that only one has its buffers in memory.
+    Large ones are computed one after the other, as they are asked for: only one has its buffers in
+    memory, and u of those before it is needed no more once it is reduced to a picture.
 
     focus: the only one of them whose w is kept; without it, that of all is.
     """
+    ledger, names = store.ledger(), classes_of(store)
     size = store.sweep.n_observed * len(sample_times(store.sweep))
-    if len(chosen) > 1 and size * len(chosen) > _AT_ONCE:
-        return [run for i in chosen for run in replay(store, [i], focus)]
+    at_once = len(chosen) if size * len(chosen) <= _AT_ONCE else 1
+    for first in range(0, len(chosen), at_once):
+        which = np.asarray(chosen[first : first + at_once], dtype=np.int64)
+        yield from _computed(store, which, focus, ledger, names)
+
+
+def _computed(
+    store: Store,
+    which: NDArray[np.int64],
+    focus: int | None,
+    ledger: Mapping[str, NDArray[np.int64]],
+    names: Sequence[str | None],
+) -> list[Replay]:
+    """Compute points together."""
     from chimera_hpc.run.block import run_block
 
-    which = np.asarray(chosen, dtype=np.int64)
     signals: dict[int, tuple[SeriesInMemory, Array]] = {}
 
     def keep(row: int, u: NDArray[Any], w: Array) -> None:
@@ -110,8 +123,7 @@ def replay(store: Store, chosen: Sequence[int], focus: int | None = None) -> lis
     series = store.sweep.keep.model_copy(update={"series": "none"})
     sweep = store.sweep.model_copy(update={"keep": series})
     made = run_block(sweep, store.points[which], on_signals=keep, starts=starts)
-    ledger, names, times = store.ledger(), classes_of(store), sample_times(store.sweep)
-    found = digests(made.features, made.scalars)
+    times, found = sample_times(store.sweep), digests(made.features, made.scalars)
     return [
         Replay(
             point=i,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 import pytest
@@ -69,16 +70,37 @@ def test_replayed_signals_are_those_of_the_store(store: Store):
 def test_large_points_are_computed_one_by_one_and_only_their_last_w_is_kept(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ):
-    together = replay(store, [oscillating(store), 0])
+    together = list(replay(store, [oscillating(store), 0]))
     monkeypatch.setattr(module, "_AT_ONCE", 1)
     monkeypatch.setattr(module, "_MOST_W", 12 * 7)
-    alone = replay(store, [oscillating(store), 0])
+    alone = list(replay(store, [oscillating(store), 0]))
     for one, other in zip(alone, together, strict=True):
         assert one.u[0:12].tobytes() == other.u[0:12].tobytes()
         assert one.w.tobytes() == other.w[-7:].tobytes()
         assert one.digest == other.digest
     focused = replay(store, [1, 0], focus=0)
     assert [run.w.shape for run in focused] == [(0, 12), (7, 12)]
+
+
+def test_large_runs_of_a_cell_are_in_memory_one_at_a_time_but_for_the_one_in_focus(
+    finished: Path, store: Store, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
+):
+    alive: WeakSet[Any] = WeakSet()
+    most = []
+
+    class Counted(module.SeriesInMemory):
+        def __init__(self, stored: Any) -> None:
+            super().__init__(stored)
+            alive.add(self)
+            most.append(len(alive))
+
+    monkeypatch.setattr(module, "SeriesInMemory", Counted)
+    monkeypatch.setattr(module, "representative", lambda store, chosen: chosen[0])
+    monkeypatch.setattr(module, "_AT_ONCE", 1)
+    code, _, _ = sweep("show", finished, "P=4", "--out", finished / "pictures")
+    assert code == 0
+    assert len(most) == 5
+    assert max(most) <= 2
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
 from chimera_hpc.plot.indicators import IndicatorProfiles, fourier_indicators
-from chimera_hpc.plot.spacetime import space_time
+from chimera_hpc.plot.spacetime import draw_panels, panel_rasters, space_time
 
 Render = Callable[[Figure], Figure]
 T = np.linspace(0.0, 10.0, 101)
@@ -55,6 +55,20 @@ def test_periods_that_cannot_be_told_apart_are_drawn_by_their_range(rendered: Re
     assert end - start == pytest.approx(12 * 2.0 * np.pi / 80.0, rel=0.05)
     labels = [frame.get_ylabel() for frame in figure.axes[-2:]]
     assert sorted(labels) == ["$u_i(t)$", "range of $u_i(t)$ in a period"]
+
+
+@pytest.mark.parametrize("n_panels", [1, 3, 4])
+def test_panels_made_one_by_one_are_drawn_as_those_of_whole_series(n_panels: int) -> None:
+    slow = (np.linspace(0.0, 10.0, 2001), np.repeat(U, 20, axis=1)[:, :2001])
+    fast = (slow[0], FAST)
+    for panels in ([slow] * n_panels, [slow, fast, fast, slow][:n_panels]):
+        whole = space_time(panels)
+        parts = draw_panels([panel_rasters(t, u, n_panels) for t, u in panels])
+        drawn = [[axes.images[0] for axes in made.axes if axes.images] for made in (whole, parts)]
+        for one, other in zip(*drawn, strict=True):
+            np.testing.assert_array_equal(one.get_array(), other.get_array())
+            assert one.get_extent() == other.get_extent()
+            assert one.get_clim() == other.get_clim()
 
 
 def test_space_time_grid_of_four_and_empty_places(rendered: Render) -> None:

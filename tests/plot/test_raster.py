@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from chimera_hpc.plot import raster
 from chimera_hpc.plot.raster import ROWS, close_up, envelope, n_periods, overview, stretch
 
 T = np.arange(0.0, 50.0, 0.01)
@@ -64,6 +65,39 @@ def test_wide_ring_is_drawn_at_some_nodes_only_where_neighbours_are_alike() -> N
     near = close_up(T[:1000], waves)
     assert near.partly == f"nodes 0 to {ROWS - 1}"
     assert near.length == f"last half, nodes 0 to {ROWS - 1}"
+
+
+class Counting:
+    """A series that notes how much of it is read at once."""
+
+    def __init__(self, u: np.ndarray) -> None:
+        self.u, self.shape, self.read = u, u.shape, []
+
+    def __getitem__(self, nodes: slice) -> np.ndarray:
+        part = self.u[nodes]
+        self.read.append(part.size)
+        return part
+
+
+@pytest.mark.parametrize(("frequency", "n_nodes"), [(0.5, 250), (0.5, 2000), (19.3, 250)])
+def test_series_is_read_in_pieces_and_its_picture_does_not_depend_on_them(
+    frequency: float, n_nodes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    u = wave(frequency, n_nodes, 2000.0)
+    whole = [overview(T[:1000], u), close_up(T[:1000], u)]
+    monkeypatch.setattr(raster, "_PIECE", 8_000)
+    counting = Counting(u)
+    made = overview(T[:1000], counting)
+    reads = [len(counting.read)]
+    for counted in (made.periods, None):
+        near = close_up(T[:1000], counting, counted=counted)
+        reads.append(len(counting.read))
+    for one, other in zip(whole, (made, near), strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+        assert (one.times, one.nodes, one.length) == (other.times, other.nodes, other.length)
+    assert max(counting.read) <= 8_000
+    # The nodes whose periods are counted, 63 in pieces of 8, are not read again for the close-up.
+    assert (reads[2] - reads[1]) - (reads[1] - reads[0]) == 8
 
 
 def test_half_a_ring_of_noise_is_a_chimera_at_every_few_nodes() -> None:

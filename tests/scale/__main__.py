@@ -110,7 +110,7 @@ def measure_large(folder: Path, tiny: bool = False) -> list[Line]:
     """Return the lines about large points and very many of them."""
     return [
         *large.rings(folder, 2_000 if tiny else 100_000, 2 if tiny else 6),
-        large.long_window(folder, 80.0 if tiny else 5_050.0),
+        *large.long_window(folder, 80.0 if tiny else 5_050.0),
         *large.projections(folder, 1_000 if tiny else 100_000),
         *large.many_points(folder, 40_000 if tiny else 10_000_000),
         *large.estimates(folder, ("P=12",) if tiny else ("P=10:15",)),
