@@ -119,6 +119,12 @@ def test_data_of_a_block_are_on_the_disk_before_its_ledger_is(filled: Store, dis
         assert state(path) in disk.safe
 
 
+def test_a_reduction_is_on_the_disk_before_it_has_its_name(filled: Store, disk: Disk) -> None:
+    disk.look_when_named(filled.path / "reduction")
+    filled.write_reduction({"a": (("k",), [1.0]), "b": (("k",), [2])}, {})
+    assert disk.unflushed == []
+
+
 CHANGES: dict[str, Callable[[Store], Any]] = {
     "extend": lambda store: store.extend(MORE),
     "adopt": lambda store: store.adopt(small_sweep("run.workers=3")),

@@ -14,13 +14,28 @@ from store_tools import block_results, fill, make_store, results
 
 import chimera_hpc
 from chimera_hpc.base.errors import BadInput
-from chimera_hpc.store.runs import read_run, run_numbers
+from chimera_hpc.store.runs import (
+    BlockWork,
+    block_work,
+    read_run,
+    record_work,
+    run_numbers,
+    start_run,
+)
 from chimera_hpc.store.store import Store
 
 
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
     return make_store(tmp_path)
+
+
+def test_work_of_all_runs_that_recorded_it_is_added(tmp_path: Path) -> None:
+    for work in ({"points": 4, "core_seconds": 2.5}, {}, {"points": 6, "core_seconds": 1.5}):
+        number = start_run(tmp_path, {})
+        record_work(tmp_path, number, work)
+    start_run(tmp_path, {})
+    assert block_work(tmp_path) == BlockWork(10, 4.0)
 
 
 def test_runs_are_numbered_and_say_what_they_are(store: Store) -> None:
