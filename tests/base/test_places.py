@@ -40,10 +40,11 @@ def test_stand_in_that_others_can_write_is_not_used(
 ) -> None:
     folder = tmp_path / f"chimera_hpc-{os.getuid()}"
     folder.mkdir()
-    folder.chmod(0o777)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with pytest.raises(PermissionError):
-        places.private_folder()
+    for mode in (0o720, 0o702, 0o777):
+        folder.chmod(mode)
+        with pytest.raises(PermissionError):
+            places.private_folder()
     # Its kernels are shared with the processes that are started, and go with the process.
     code = f"{CACHE}; import subprocess, sys; subprocess.run([sys.executable, '-c', '''{CACHE}'''])"
     said = run(code, NUMBA_CACHE_DIR=NOWHERE, TMPDIR=str(tmp_path)).splitlines()

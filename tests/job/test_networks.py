@@ -351,6 +351,7 @@ def test_a_wrong_table_is_refused_in_one_line(changes: dict[str, Any], message: 
             "layers: 5 does not divide n_nodes = 18",
         ),
         ("multiplex", {"grid": {"layers": 4, "P": 2}}, "grid.P: 2 is too large, at most 1 is all"),
+        ("multiplex", {"grid": {"layers": 3, "P": 2}}, "grid.P: 2 is too large, at most 1 is all"),
         ("two_populations", {"fixed": {"n_nodes": 13}}, "fixed.n_nodes: 13 is odd"),
         ("scale_free", {"grid": {"m": 12}}, "grid.m: 12 is too large, at most 11 is allowed"),
         ("random", {"grid": {"mean_degree": 12.0}}, "grid.mean_degree: 12.0 is too large, at mo"),

@@ -103,6 +103,14 @@ def test_relabelling_permutes_nodes_and_keeps_links_and_triangles(
     assert equal(renamed.relabel(np.argsort(new)), network)
 
 
+def test_order_and_groups_of_nodes_go_with_their_new_names() -> None:
+    network = Network.ring(4, 1).with_order([3, 0, 1, 2]).with_groups([5, 6, 7, 8])
+    renamed = network.relabel([1, 2, 3, 0])
+    assert renamed.order.tolist() == [0, 1, 2, 3]
+    assert renamed.groups is not None
+    assert renamed.groups.tolist() == [8, 5, 6, 7]
+
+
 def test_a_ring_is_the_same_network_as_its_list_of_links() -> None:
     ring = Network.ring(9, 3).reorient_node(0, 2)
     listed = Network(9, ring.links)

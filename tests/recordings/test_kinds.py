@@ -82,6 +82,11 @@ def test_microvolts_are_not_steady(tmp_path: Path):
     )
 
 
+def test_samples_per_period_are_those_of_the_recording_not_of_its_grid():
+    found = measure(prepare(Recording(T, U), 0.025), Features(), True, None)
+    assert found.samples_a_period == pytest.approx(50.0, rel=0.01)
+
+
 def test_times_of_the_file_and_a_step_exclude_each_other(tmp_path: Path):
     (tmp_path / "u.csv").write_text(table(TIMES, ["time_s", *NAMES]))
     with pytest.raises(BadInput, match="leave --step out, or --drop time_s"):

@@ -17,7 +17,7 @@ from chimera_hpc.store.blocks import DamagedChunk
 from chimera_hpc.store.merge import merge
 from chimera_hpc.store.schema import decode_series
 from chimera_hpc.store.store import Store
-from chimera_hpc.store.strips import StoredSeries
+from chimera_hpc.store.strips import PackedSeries, StoredSeries
 
 
 def store_of(path: Path, u: np.ndarray, *overrides: str) -> Store:
@@ -139,3 +139,16 @@ def test_series_of_stores_that_were_not_cut_are_read_and_added_to(
     merge(merged, [store])
     assert Store.open(merged).files.piece != (400, 100)
     np.testing.assert_array_equal(Store.open(merged).series(0), before.series(0))
+
+
+def test_series_of_steady_runs_are_packed_and_those_that_never_ran_are_missing(
+    tmp_path: Path,
+) -> None:
+    store = Store.plan(tmp_path / "store.zarr", small_sweep())
+    made = results(store, range(4))
+    made.status[:3] = Status.DONE, Status.STEADY, Status.NO_WINDOW
+    store.write_block(0, made, store.start_run({}), 1)
+    packed = decode_series(PackedSeries(store)[0:5, :, :])
+    for point in range(3):
+        np.testing.assert_array_equal(packed[point], store.series(point))
+    assert np.isnan(packed[4]).all()
