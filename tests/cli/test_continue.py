@@ -231,6 +231,7 @@ def test_first_states_come_from_a_file(tmp_path):
         ({"u": np.zeros(11), "v": np.zeros(24)}, "u has 11 values per state, this model has 12"),
         ({"u": np.zeros(12)}, "v has 0 values per state, this model has 24"),
         ({"u": np.zeros((1, 12)), "v": np.zeros((2, 24))}, "none for seed 4: row s is for seed s"),
+        ({"u": np.zeros((1, 12)), "v": np.zeros((4, 24))}, "v has 4 rows, none for seed 4"),
         ({"u": np.full(12, np.nan), "v": np.zeros(24)}, "u holds values that are not finite"),
         ({"w": np.zeros(12)}, "unknown array 'w'"),
         ({"v": np.zeros(12)}, "no array u"),
