@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chimera_hpc.classify.naming import CLASSES
+from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
 from chimera_hpc.classify.tree import Integers
+
+Verdicts = Sequence[str | None]
+_COMMON = {*CLASSES, STEADY, NO_WINDOW, None}
 
 
 def classes_by_incoherence(strength: ArrayLike) -> list[str]:
@@ -22,6 +25,14 @@ def classes_by_incoherence(strength: ArrayLike) -> list[str]:
         ordered if s <= 0.0 else disordered if s >= 1.0 else chimera
         for s in np.asarray(strength, dtype=np.float64).tolist()
     ]
+
+
+def comparable(methods: Mapping[str, Verdicts]) -> dict[str, Verdicts]:
+    """Return the methods without classes of their own: A of one is not to be compared with others.
+
+    Their classes are ordered, chimera and disordered, beside runs at rest and without windows.
+    """
+    return {name: verdicts for name, verdicts in methods.items() if not {*verdicts} - _COMMON}
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,10 @@ All three look at Ward's clusters of points scaled to [0, 1].
 - Stability: mean adjusted Rand index between the clusters of two random subsets of two thirds, on
   the runs that both hold.
 
+The answer is the number of the silhouette. It is 1 if the gap statistic says 1, which stops too
+early where few points make classes of unequal width, unless the silhouette is strong, 0.7 or more
+(Kaufman, Rousseeuw 1990, doi:10.1002/9780470316801), and stability is not 1.
+
 Points far from all others but few are no class: they are set apart first. If the others then fill
 less than a tenth of the range of all, what is left between them is no class: only k = 1 is tried.
 """
@@ -42,6 +46,8 @@ _STABLE = 0.9
 _TIE = 0.005
 _CLEAR = 0.5
 """Mean silhouette from which clusters are apart."""
+_STRONG = 0.7
+"""Mean silhouette from which clusters are a strong structure (Kaufman, Rousseeuw 1990)."""
 _MOST_POINTS = 1000
 
 
@@ -80,8 +86,10 @@ class ClassNumber:
 
     @property
     def answer(self) -> int:
-        """1 if gap or silhouette say so, else the k of the largest silhouette."""
-        return 1 if self.by_gap == 1 else self.by_silhouette
+        """The k of the silhouette; 1 if the gap statistic says so and the silhouette is weak."""
+        k = self.by_silhouette
+        strong = self.silhouette[k - 1] >= _STRONG and self.by_stability > 1
+        return k if self.by_gap > 1 or strong else 1
 
     @property
     def sentence(self) -> str:

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from chimera_hpc.classify.agreement import comparable
 from chimera_hpc.plot import style
 from chimera_hpc.plot.figure_input import FigureInput, numbers
 from chimera_hpc.plot.modes import Parameters, draw_modal_classes
@@ -109,10 +110,14 @@ def _draw_matrix(axes: Axes, comparison: Comparison) -> None:
 
 @style.styled
 def verdicts(x: ArrayLike, methods: Methods, *, label: str = "$P$") -> Figure:
-    """Draw each method's class for each cell x (k,) in a row; a bar marks where they differ."""
+    """Draw each method's class for each cell x (k,) in a row; a bar marks where they differ.
+
+    Methods with classes of their own, A or class-1, are drawn, but not compared.
+    """
     values = np.asarray(x, dtype=np.float64)
     figure, (axes,) = style.new_panels(1, style.PAGE - 0.8, 1.1 + 0.36 * len(methods))
-    differ = [len(set(column)) > 1 for column in zip(*methods.values(), strict=True)]
+    compared = list(comparable(methods).values())
+    differ = [len({classes[i] for classes in compared}) > 1 for i in range(len(values))]
     width = float(np.min(np.diff(np.unique(values)), initial=1.0))
     for position in values[differ]:
         axes.axvspan(position - 0.5 * width, position + 0.5 * width, color="#fbe7b2", linewidth=0.0)
@@ -151,6 +156,7 @@ def verdict_maps(parameters: Parameters, methods: Methods) -> Figure:
     """Draw each method's class over the plane of two parameters, and the share that is shared.
 
     The last panel is the share of methods, of those with a class, that give the most frequent one.
+    Methods with classes of their own, A or class-1, do not count in it.
     """
     figure, axes = style.new_panels(len(methods) + 1, 2.1 * (len(methods) + 1), 2.6, sharey=True)
     for frame, (name, classes) in zip(axes, methods.items(), strict=False):
@@ -160,7 +166,8 @@ def verdict_maps(parameters: Parameters, methods: Methods) -> Figure:
     across, column = np.unique(np.asarray(x, float), return_inverse=True)
     up, row = np.unique(np.asarray(y, float), return_inverse=True)
     shares = np.full((len(across), len(up)), np.nan)
-    shares[column, row] = [_shared(cell) for cell in zip(*methods.values(), strict=True)]
+    compared = list(comparable(methods).values())
+    shares[column, row] = [_shared([one[i] for one in compared]) for i in range(len(row))]
     mesh = style.draw_shares(axes[-1], across, up, shares)
     axes[-1].set_xlabel(x_label)
     axes[-1].set_title("share that agrees")

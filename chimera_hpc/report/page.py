@@ -198,7 +198,7 @@ def _agreement(content: Content) -> dict[str, Any]:
         "caption": CAPTION,
         "matrix": matrix_rows(entry),
         "rules": entry.get("rules", {}),
-        "line": "; ".join([*remarks(entry), differing_line(entry)]),
+        "lines": [*remarks(entry), differing_line(entry)],
         "cells": differing_rows(entry),
     }
 

@@ -43,6 +43,23 @@ def test_kinds_are_counted(sizes: tuple[int, ...]) -> None:
     np.testing.assert_array_equal(class_number(shuffled).stability, found.stability)
 
 
+def test_clear_kinds_are_counted_where_the_gap_statistic_stops_at_one() -> None:
+    rng = np.random.default_rng(7)
+    sizes, means = [7, 6, 6], [[0.125, 0.01, 0.01], [0.36, 0.15, 0.085], [0.53, 0.01, 0.015]]
+    widths = np.repeat([[0.001, 0.002, 0.003], [0.04, 0.05, 0.02], [0.05, 0.005, 0.004]], sizes, 0)
+    found = class_number(np.repeat(means, sizes, axis=0) + widths * rng.normal(size=(19, 3)))
+    assert (found.by_gap, found.answer) == (1, 3)
+    assert "look like 3 classes (gap statistic 1, silhouette 3, stability 3)" in found.sentence
+
+
+@pytest.mark.parametrize("n", [30, 72, 400])
+def test_points_along_a_line_are_one_state_though_halves_are_apart(n: int) -> None:
+    line = np.outer(np.linspace(0, 1, n), [0.5, 0.1, 0.1])
+    found = class_number(line + 0.005 * np.random.default_rng(0).normal(size=line.shape))
+    assert found.by_silhouette > 1
+    assert (found.by_gap, found.answer) == (1, 1)
+
+
 def test_remainders_of_one_state_are_no_classes_next_to_runs_apart() -> None:
     # as runs in phase, which differ by what is left of their starts, next to two chimeras
     rng = np.random.default_rng(0)

@@ -321,6 +321,13 @@ def test_bursts_are_badly_fitted() -> None:
     assert found["r_squared"] < 0.5
 
 
+def test_third_harmonic_is_the_share_that_the_fit_leaves() -> None:
+    t = 0.01 * np.arange(5001)
+    x = 2 * np.pi * t[:, None] + np.arange(3)
+    features = measures.fourier_features(t, np.cos(x) + 0.3 * np.cos(3 * x))
+    np.testing.assert_allclose(features.r_squared, 1 / 1.09, atol=1e-3)
+
+
 def test_names_from_the_literature_stand_for_measures() -> None:
     given = Measures(panel=["triplet", "SI", "sigma_l", "order", "fit"])
     assert given.panel == ("variations", "range", "local_sigma", "sigma", "order", "fit")

@@ -255,6 +255,8 @@ def test_verdicts_mark_cells_where_methods_differ(rendered: Render, colour_at: A
     assert colour_at(axes, 3, 0) == [tuple(np.round(to_rgb(style.BLUE), 6))]
     assert colour_at(axes, 3, 1) == [tuple(np.round(to_rgb(style.BLACK), 6))]
     assert colour_at(axes, 4, 0) == []
+    letters = {"triplets": ["A", "B", "B"], "SI": ["ordered"] * 3, "ACM": ["ordered"] * 3}
+    assert list(rendered(verdicts([2, 3, 4], letters)).axes[0].patches) == []
 
 
 def test_agreement_matrix_has_a_number_in_each_known_field(rendered: Render) -> None:
@@ -277,6 +279,8 @@ def test_verdict_maps_show_the_share_that_agrees(rendered: Render) -> None:
     assert [axes.get_title() for axes in maps] == ["SI", "ACM"]
     (mesh,) = share.collections
     np.testing.assert_array_equal(mesh.get_array(), [[1.0, 1.0], [0.5, 1.0]])
+    *_, share, _ = rendered(verdict_maps(plane, {"triplets": list("ABAB"), **methods})).axes
+    np.testing.assert_array_equal(share.collections[0].get_array(), [[1.0, 1.0], [0.5, 1.0]])
 
 
 def test_class_number_marks_the_answer_of_each_measure(rendered: Render) -> None:

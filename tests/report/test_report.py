@@ -18,6 +18,7 @@ from chimera_hpc.reduction.reduction import reduce_sweep
 from chimera_hpc.reduction.runs import drawn_network
 from chimera_hpc.report import charts, pictures, write_report
 from chimera_hpc.report import content as contents
+from chimera_hpc.report import page as report_page
 from chimera_hpc.report.content import Content
 from chimera_hpc.report.looks import look_of
 from chimera_hpc.report.networks import drawing
@@ -215,10 +216,11 @@ def test_long_list_of_failures_is_cut(tmp_path, filled):
 
 
 @pytest.mark.slow
-def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
+def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys, monkeypatch):
     wish = ('reduction.analyses=["agreement"]', "reduction.deltas=[0.1]")
     wish += ('reduction.figures=["verdicts"]',)
     filled(tmp_path, *PLANE, *wish, 'reduction.delta_unit="absolute"')
+    monkeypatch.setattr(report_page, "remarks", lambda _: ["SI of 2 of 9 runs"])
     assert main(["reduce", str(tmp_path)]) == 0
     told = " ".join(capsys.readouterr().out.split())
     head = "triplets SI sigma_1"
@@ -226,7 +228,7 @@ def test_agreement_of_measures_is_told_and_shown(tmp_path, filled, capsys):
     assert f"{caption}: {head}" in told
     words = words_of(page_of(tmp_path)).replace("&#39;", "'")
     assert f"1 is full agreement, 0 as by chance, - not defined. {head} triplets" in words
-    assert "sigma_1: modes of its density The measures differ in " in words
+    assert "sigma_1: modes of its density SI of 2 of 9 runs. The measures differ in " in words
     assert (tmp_path / "figures" / "verdicts.png").stat().st_size > 0
 
 

@@ -10,9 +10,14 @@ import numpy as np
 
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
-from chimera_hpc.classify.agreement import adjusted_rand, classes_by_incoherence, confusion
+from chimera_hpc.classify.agreement import (
+    adjusted_rand,
+    classes_by_incoherence,
+    comparable,
+    confusion,
+)
 from chimera_hpc.classify.density import density_classes
-from chimera_hpc.classify.naming import CLASSES, NO_WINDOW, STEADY
+from chimera_hpc.classify.naming import CLASSES, STEADY
 from chimera_hpc.classify.verdicts import RULES
 from chimera_hpc.job.class_names import is_papers_system
 from chimera_hpc.reduction.analyses.incoherence import strengths, unit_of
@@ -20,7 +25,6 @@ from chimera_hpc.reduction.analyses.judged import most_frequent
 from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 Verdicts = list[str | None]
-_COMMON = {*CLASSES, STEADY, NO_WINDOW, None}
 
 
 def agreement(given: AnalysisInput) -> dict[str, Any]:
@@ -38,9 +42,6 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
     methods, rules = _methods(given)
     modal = {name: _modal(given, verdicts) for name, verdicts in methods.items()}
     names = list(methods)
-    comparable = {
-        name: verdicts for name, verdicts in modal.items() if not (set(verdicts) - _COMMON)
-    }
     return {
         "delta": given.sweep.reduction.deltas[0],
         "classes": CLASSES,
@@ -57,7 +58,7 @@ def agreement(given: AnalysisInput) -> dict[str, Any]:
         "differing": [
             given.place(i) | {name: verdicts[i] for name, verdicts in modal.items()}
             for i in range(given.n_cells)
-            if len({verdicts[i] for verdicts in comparable.values()}) > 1
+            if len({verdicts[i] for verdicts in comparable(modal).values()}) > 1
         ],
     }
 
