@@ -148,9 +148,9 @@ _HEAD = """# Measured performance
 
     scripts/bench --write
 
-measures everything on this page in one run. It installs the peers in `.venv-bench`.
+measures everything on this page. It installs the peers in `.venv-bench`.
 
-* Contenders run in turns, and medians are compared. Where a peer is in the row, a turn takes at
+* The programs of a row run in turns, and medians are compared. In rows with a peer, a turn takes at
   least one second.
 * A whole command is compared with bare blocks, which are the same points without executor and
   store, in turns of one second. Bare blocks are compared with dgemm in turns of 0.1 s. One process
@@ -177,22 +177,23 @@ What limits the speed:
 * Shared cores. A virtual core may be one of two hardware threads of a core, and another machine may
   use the second. Two processes then do less than twice the work of one. dgemm is therefore run in
   one and in two processes at the same moments as the blocks. The row "2 workers over 1" is given as
-  measured, and relative to dgemm."""
+  measured, and the next row relative to dgemm."""
 
 _ERRORS = """\
 *Error* is the largest difference of u from a DOP853 solution at rtol 1e-13, up to t = 20; at later
-times chaos amplifies any error. Peers run at rtol 1e-6. Ours runs at the loosest tolerance whose
-error is not larger than theirs; the ratio at equal tolerance is given too. Full form: nodes and
-links as the paper prints them, which is what a user of the peers would write. Reduced form: the
-exact reduction that this package uses."""
+times chaos amplifies any error. Peers run at rtol 1e-6. This package ("ours") runs at
+the loosest tolerance whose error is not larger than theirs; the ratio at equal
+tolerance is given too. Full form: the equations of nodes and links as the paper prints them, which
+is what a user of the peers would write. Reduced form: the exact reduction that this package
+uses."""
 
 _PICTURE = """![Work against precision](images/performance.png)"""
 
 _PRICED = (1e-2, 1e-4, 1e-6)
 _PRECISION = """\
-Tsit5 is the default method, as in the paper; a job or a call may choose another one. Time per
-trajectory of 20 time units, with u every 0.01, at some errors, interpolated between the points of
-the picture:"""
+Tsit5 is the default method, as in the paper; a job or a call may choose another one. The table has
+the time per trajectory of 20 time units, with u every 0.01, at some errors, interpolated between
+the points of the picture:"""
 
 _SCALING = """![Seconds against workers, points, nodes and P](images/scaling.png)"""
 
@@ -212,6 +213,7 @@ the ledger."""
 
 _AT_SCALE = """\
 With a scheduler, its single thread is the first bottleneck: it can feed about (seconds per block) /
-(scheduler seconds per block) cores. Job arrays (`slurm --mode array`) need no scheduler. They lose
-the time of the last block of each core and of reading the ledger once. Neither simulation includes
-the file system: each block is five files and a claim, and a metadata server has its own limits."""
+(scheduler seconds per block) cores. Job arrays (`slurm --mode array`) need no scheduler. They
+lose the time of the last block of each core, and the time to read the ledger once. Neither
+simulation includes the file system: each block is five files and a claim, and a metadata server has
+its own limits."""

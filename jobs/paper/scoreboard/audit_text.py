@@ -27,14 +27,14 @@ def audit_tables(audit: Mapping[str, Any]) -> str:
 
 _INTRODUCTION = f"""\
 2 % of all points, spread over the cells, are run again at 100 times tighter tolerance, with the
-initial state moved by 1e-13 at the old tolerance (the control: what chaos alone does to a label),
-and to t = 5000. Given are the labels that changed with their Wilson 95 % interval, and the net
-change of the class fractions. The last column resamples the seeds of every cell {DRAWS} times: the
-mean probability that its modal class comes out the same. The job's results.json holds the bootstrap
-of every cell.
+initial state moved by 1e-13 at the old tolerance (the control: how many labels change by chaos
+alone), and to t = 5000. The table has the labels that changed with their Wilson 95 % interval, and
+the net change of the class fractions. The last column resamples the seeds of every cell {DRAWS}
+times: the mean probability that its modal class comes out the same. The job's results.json holds
+the bootstrap of every cell.
 """
 _POINTS = """\
-Points whose label changed in one of the ways of running again:
+Points whose label changed in at least one of the three repetitions:
 """
 
 

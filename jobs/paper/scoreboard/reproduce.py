@@ -30,18 +30,20 @@ _HEAD = """\
 # Claims of the paper
 
 `scripts/reproduce` runs the jobs in `jobs/paper/`, judges the claims of `jobs/paper/claims.toml`
-by the rules in `jobs/paper/scoreboard/rules.py`, and writes this table (claims.md), results.json
-and the figures; `--quick` thins the grids, `--only JOB,...` runs some jobs, `--only none` judges
-what there is. Rules were fixed before the jobs were run; none was changed to suit a result, but for
-one that had counted slow motion without an oscillation as an oscillation (app. C), which
-now has a claim of its own. Fractions have Wilson 95 % intervals.
+by the rules in `jobs/paper/scoreboard/rules.py`, and writes this page (claims.md), results.json
+and the figures. `--quick` thins the grids, `--only JOB,...` runs some jobs, and `--only none`
+judges the results that exist. The rules were fixed before the jobs were run. None was changed to
+suit a result, with one exception: a rule that counted slow motion as an oscillation (app. C) was
+corrected, and slow motion now has a claim of its own. Fractions have Wilson 95 % intervals.
 
-Every claim is judged twice, by the same runs and the same rule: under the default convention of the
-Fourier features, and under `paper-printed` ([the method](method.md)). Each convention is applied to
-the whole board. Claims that do not depend on it have one measurement, and the same outcome twice.
+Every claim is judged twice, with the same runs and the same rule: under the default convention of
+the Fourier features, and under `paper-printed` ([the method](method.md)). Each convention is
+applied to the whole board. Claims that do not depend on it have one measurement, and the same
+outcome twice.
 
-A claim that reproduces under neither has a cause (`jobs/paper/causes.toml`), and the number of 200
-sweeps with redrawn seeds (a bootstrap of the runs of each cell) in which it holds.
+A claim that is reproduced under neither convention has a cause (`jobs/paper/causes.toml`). Next to
+it is the number of 200 sweeps with redrawn seeds (a bootstrap of the runs of each cell) in which
+the claim holds.
 """
 _NOTES = "robustness.md"
 """Next to the claims: what was found of W(Q_r) besides."""
@@ -248,9 +250,9 @@ def _cost_line(spent: dict[str, float]) -> list[str]:
     if not spent:
         return []
     return [
-        f"The last call that ran jobs ran {spent['jobs']} in {spent['minutes']:.0f} minutes of "
-        f"wall time, on {spent['processors']} processors that {spent['load']:.1f} processes wanted "
-        f"at the end (mean of 15 minutes).\n"
+        f"The last call that ran jobs ran {spent['jobs']} of them in {spent['minutes']:.0f} "
+        f"minutes of wall time on {spent['processors']} processors; the load average at its end "
+        f"was {spent['load']:.1f} (15 minutes).\n"
     ]
 
 
