@@ -56,6 +56,19 @@ def test_samples_of_a_failure_end_where_it_failed(system, status):
     assert np.isfinite(run.outcome.y_end).all()
 
 
+def test_failure_at_once_is_told_after_few_steps():
+    nan = FAILURES["parameter that is NaN"][0]
+    (run,) = run_all([nan], [ONE], Control(3.0, 0.0, 0.1, max_steps=50))
+    assert run.outcome.status == Status.NON_FINITE
+
+
+def test_last_step_ends_at_the_end_wherever_that_is():
+    # y' = 1 has no error: steps grow tenfold, so that ends lie anywhere within the last one.
+    for t_end in np.geomspace(1.0, 12.0, 500):
+        (run,) = run_all([power_law(1.0, 0.0)], [ONE], Control(t_end, 0.0, t_end))
+        np.testing.assert_allclose(run.outcome.y_end, 1.0 + t_end, rtol=1e-12)
+
+
 def test_blow_up_is_followed_to_its_time():
     # y' = y**2 from 1 is 1 / (1 - t): infinite at t = 1.
     control = Control(3.0, 0.0, 0.1, rtol=1e-9, atol=1e-9)
