@@ -91,6 +91,16 @@ def test_time_out_ends_only_the_run_that_takes_too_long(lanes):
     assert runs[1].outcome.elapsed > 0.1
 
 
+def test_time_out_is_of_wall_time_however_many_lanes_share_it():
+    control = Control(3.0, 0.0, 0.1, max_steps=10**9, time_out=0.4)
+    began = time.perf_counter()
+    runs = run_all([ENDLESS] * LANES, [ONE] * LANES, control, lanes=LANES)
+    assert time.perf_counter() - began < 0.4 * LANES / 2
+    assert {run.outcome.status for run in runs} == {Status.TIME_OUT}
+    # The time is shared out among the lanes.
+    assert sum(run.outcome.elapsed for run in runs) < 0.4 * LANES / 2
+
+
 def test_late_blow_up_ends_by_its_step_size_too():
     # The smallest step is relative to the time: 1e-14 would no longer change t = 1000.
     control = Control(2000.0, 0.0, 100.0, max_steps=10**6)
