@@ -84,22 +84,23 @@ def packed(network: Network, which: Which, k: int = 0) -> Packed:
 
 
 def pack(*matrices: csr_array, share: bool = True, split: int = 0) -> Packed:
-    """Return matrices as integers: a header of seven for each, ``split``, then the parts.
+    """Return matrices as integers: a header of eight for each, ``split``, then the parts.
 
     The header is: rows of M, rows of T (0: none shared), and the offsets of the order in which rows
-    are stored, their starts, columns, values (0: equal in each row), and of what belongs to each
-    row: the label of a shared one, or the factor of equal values, then the diagonal. Rows are in
-    order of their lengths, so that processors predict the ends of the sums; entries of a row are in
-    the order of columns. Rows before ``split`` stay before the others.
+    are stored, their starts, columns, values (0: equal in each row), of what belongs to each row
+    (the label of a shared one, or the factor of equal values, then the diagonal), and of the runs.
+    Rows are in order of their lengths, so that processors predict the ends of the sums; entries of
+    a row are in the order of columns. Rows before ``split`` stay before the others. A run is some
+    rows of one length: there is their number, then the length of each and the row at its end.
     """
     found = [_parts(matrix, share, split) for matrix in matrices]
     header: list[int] = []
-    at = 7 * len(found) + 1
+    at = 8 * len(found) + 1
     for rows, shared, parts in found:
         offsets = at + np.cumsum([0, *map(len, parts)])
-        uniform = len(parts) > 4 and not len(parts[3])
+        uniform = len(parts) > 5 and not len(parts[3])
         values = 0 if uniform else int(offsets[3])
-        header += [rows, shared, *offsets[:3].tolist(), values, int(offsets[4])]
+        header += [rows, shared, *offsets[:3].tolist(), values, int(offsets[4]), int(offsets[-2])]
         at = int(offsets[-1])
     blocks = [part for _, _, parts in found for part in parts]
     integers = np.concatenate([np.array([*header, split], dtype=np.int64), *blocks])
@@ -109,10 +110,22 @@ def pack(*matrices: csr_array, share: bool = True, split: int = 0) -> Packed:
 
 Parts: TypeAlias = tuple[int, int, list[Integers]]
 """Rows of M, rows of T, and the blocks: order, starts, columns, values, labels or factors and
-diagonal."""
+diagonal, runs."""
 
 
 def _parts(matrix: csr_array, share: bool, split: int) -> Parts:
+    rows, shared, parts = _blocks(matrix, share, split)
+    return rows, shared, [*parts, _runs(parts[1])]
+
+
+def _runs(starts: Integers) -> Integers:
+    lengths = np.diff(starts)
+    last = np.flatnonzero(np.diff(lengths, append=-1))
+    pairs = np.stack([lengths[last], last + 1], axis=1)
+    return _ints(np.array([len(last), *pairs.ravel()]))
+
+
+def _blocks(matrix: csr_array, share: bool, split: int) -> Parts:
     ordered = matrix.copy()
     ordered.sum_duplicates()
     n = ordered.shape[0]

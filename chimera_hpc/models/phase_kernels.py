@@ -111,7 +111,7 @@ def _scale(zero, params, places, at, strength):
 @jit()
 def _simplicial(zero, y, dy, params, ints, explosive):
     dirac, adjoint = matrix_at(ints, 0), matrix_at(ints, 1)
-    n, lower = dirac.rows, ints[14]
+    n, lower = dirac.rows, ints[16]
     sums, at = 1 + n, 5 + n
     down, up = (0, lower), (lower, adjoint.rows)
     _forces(zero, y, params, at, adjoint, down, sums)

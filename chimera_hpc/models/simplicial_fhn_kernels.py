@@ -5,8 +5,23 @@ from functools import cache
 from chimera_hpc.integrate.jit import jit
 from chimera_hpc.integrate.simd import LANES, broadcast, fma, load, store
 from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
-from chimera_hpc.models.csr_kernels import matrix_at, multiply_shared, product, row_at
+from chimera_hpc.models.csr_kernels import (
+    add_products,
+    matrix_at,
+    multiply_shared,
+    product,
+    row_at,
+)
 from chimera_hpc.models.topological_fhn_kernels import activator
+
+
+@jit()
+def _local(zero, i, context):
+    # Store du/dt of element i, and return b s + c w.
+    y, dy, params, n, rate, c = context
+    u, w = load(zero, y, i), load(zero, y, n + i)
+    store(dy, i, activator(u, w, rate))
+    return fma(c, w, load(zero, params, 2 + i))
 
 
 @jit()
@@ -16,12 +31,8 @@ def _reduced(zero, y, dy, params, ints):
     work = zero, params, 2 + n
     multiply_shared(laplacian, y, 0, work)
     rate, c = load(zero, params, 0), load(zero, params, 1)
-    for k in range(n):
-        i = row_at(laplacian, k)
-        u, w = load(zero, y, i), load(zero, y, n + i)
-        store(dy, i, activator(u, w, rate))
-        local = fma(c, w, load(zero, params, 2 + i))
-        store(dy, n + i, product(laplacian, k, y, 0, local, work))
+    context = y, dy, params, n, rate, c
+    add_products(laplacian, y, 0, _local, context, (dy, n), work)
 
 
 @jit()

@@ -7,14 +7,24 @@ import pytest
 from networks_for_tests import complete, random_complex, two_populations
 from scipy.sparse import csr_array
 
+from chimera_hpc.integrate.jit import jit
+from chimera_hpc.integrate.simd import load, store
+from chimera_hpc.integrate.stepper import RIGHT_HAND_SIDE
 from chimera_hpc.models.csr import Packed, pack, packed
+from chimera_hpc.models.csr_kernels import add_products, matrix_at, product, row_at
 
 
 def unpacked(found: Packed, number: int = 0) -> np.ndarray:
     """Read a matrix back, entry by entry."""
     ints = found.integers
     reals = ints.view(np.float64)
-    rows, shared, order, start, column, value, each = ints[7 * number : 7 * number + 7].tolist()
+    header = ints[8 * number : 8 * number + 8].tolist()
+    rows, shared, order, start, column, value, each, runs = header
+    first = 0
+    for length, end in ints[runs + 1 :][: 2 * ints[runs]].reshape(-1, 2):
+        assert (np.diff(ints[start:][first : end + 1]) == length).all()
+        first = end
+    assert first == (shared or rows)
     table = []
     for k in range(shared or rows):
         begin, end = ints[start + k : start + k + 2].tolist()
@@ -60,6 +70,47 @@ def test_equal_rows_are_stored_once(matrix, n_shared, n_entries):
     assert found.kernel.startswith(f"{n_shared} shared rows" if n_shared else "sparse rows")
 
 
+def _by_product(y, dy, params, ints):
+    matrix = matrix_at(ints, 0)
+    for k in range(matrix.rows):
+        i = row_at(matrix, k)
+        local = load(0.0, params, 1 + matrix.rows + i)
+        store(dy, i, product(matrix, k, y, 0, local, (0.0, params, 0)))
+
+
+@jit()
+def _local(zero, i, context):
+    params, first = context
+    return load(zero, params, first + i)
+
+
+def _in_pairs(y, dy, params, ints):
+    matrix = matrix_at(ints, 0)
+    context, work = (params, 1 + matrix.rows), (0.0, params, 0)
+    add_products(matrix, y, 0, _local, context, (dy, 0), work)
+
+
+@pytest.mark.parametrize("kind", ["equal", "values", "shared"])
+def test_rows_in_pairs_have_the_bits_of_single_rows(kind):
+    rng = np.random.default_rng(0)
+    n = 40
+    links = rng.random((n, n)) < 0.3 * rng.random(n)[:, None]
+    values = {
+        "equal": links * rng.random(n)[:, None],
+        "values": links * rng.random((n, n)),
+        "shared": np.kron(rng.random((2, 2)), np.ones((n // 2, n // 2))) * ~np.eye(n, dtype=bool),
+    }[kind]
+    found = pack(csr_array(values))
+    assert (found.integers[5] == 0, found.n_shared) == (kind == "equal", 2 * (kind == "shared"))
+    y, params = rng.standard_normal((n, 1)), rng.standard_normal((1 + 2 * n, 1))
+    results = []
+    for function in (_by_product, _in_pairs):
+        dy = np.zeros((n, 1))
+        jit(RIGHT_HAND_SIDE)(function)(y, dy, params, found.integers)
+        results.append(dy)
+    np.testing.assert_array_equal(*results)
+
+
 def test_large_populations_share_two_rows():
     for which in ("adjacency", "differences", "mean"):
         found = packed(two_populations(150, 0.2), which)
@@ -74,7 +125,7 @@ def test_matrices_of_a_network(k):
     found = packed(network, "dirac", k)
     np.testing.assert_array_equal(unpacked(found), dirac)
     np.testing.assert_array_equal(unpacked(found, 1), dirac.T)
-    assert found.integers[14] == (0, network.n_nodes, network.n_links)[k]
+    assert found.integers[16] == (0, network.n_nodes, network.n_links)[k]
     laplacian = unpacked(packed(network, "laplacian", k))
     np.testing.assert_array_equal(laplacian, network.laplacian(k).toarray())
     assert packed(network, "dirac", k) is found
