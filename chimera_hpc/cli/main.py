@@ -25,10 +25,19 @@ _EXITS = """exit status:
 _INTERRUPTED = 130
 
 
+class OneLineParser(ArgumentParser):
+    """A parser that says what is wrong with a command line in one line, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with exit status 2."""
+        line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
+        self.exit(2, f"error: {line}; {self.prog} --help shows the usage\n")
+
+
 def parser(
     program: str = "python -m chimera_hpc.sweep",
     typed: Sequence[str] | None = None,
-    kind: type[ArgumentParser] = ArgumentParser,
+    kind: type[ArgumentParser] = OneLineParser,
 ) -> ArgumentParser:
     """Return the parser of the whole command line, called by this name.
 

@@ -214,12 +214,25 @@ def _arrays(shapes: dict[str, Any], choice: Choice) -> Recording:
         raise BadInput(f"--time {time}: the file has {', '.join(shapes)}")
     notes = [f"signals: array {name}"] + ([f"times: array {time}"] if time else [])
     u = as_signals(name, shapes[name])
-    if time is None or choice.no_times:
+    if choice.no_times:
+        return Recording(None, u, (), tuple(notes))
+    if time is None:
+        _refuse_other_length(shapes, name)
         return Recording(None, u, (), tuple(notes))
     t, how, said = of_numbers(as_times(time, shapes[time]))
     if shapes[time].dtype.kind in "mM":
         how = [DATED]
     return Recording(t, u, (), (*notes, *how), tuple(said))
+
+
+def _refuse_other_length(arrays: dict[str, Any], signals: str) -> None:
+    """Raise BadInput for times that are not as many as the samples."""
+    for key, array in arrays.items():
+        if array.ndim == 1 and len(array) > 1 and key.rpartition(".")[2].lower() in _TIMES:
+            raise BadInput(
+                f"{len(array)} times in {key}, {signals} has the shape {arrays[signals].shape}; "
+                "--step X gives the time between two samples instead"
+            )
 
 
 def _names(archive: Any) -> list[str]:

@@ -133,3 +133,24 @@ def test_merge_without_the_name_of_the_new_folder_is_refused(capsys):
         main(["merge", "one", "two"])
     assert end.value.code == 2
     assert "required: --out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "the following arguments are required: COMMAND"),
+        (("classify",), "the following arguments are required: FILE"),
+        (("classify", "u.npz", "--bridge", "x"), "argument --bridge: invalid int value: 'x'"),
+        (("plan", "job", "--one\ntwo"), "unrecognized arguments: --one\\ntwo"),
+    ],
+)
+def test_a_wrong_command_line_is_one_line_too(
+    words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    out, error = capsys.readouterr()
+    assert (stop.value.code, out) == (2, "")
+    assert error.startswith(f"error: {said}; python -m chimera_hpc.sweep ")
+    assert error.endswith(" --help shows the usage\n")
+    assert error.count("\n") == 1

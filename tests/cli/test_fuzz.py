@@ -69,14 +69,14 @@ def call(*words: object) -> tuple[int, str]:
         try:
             code = main([str(word) for word in words])
         except SystemExit as stop:
-            # argparse, with its usage.
-            return int(str(stop.code)), "usage"
+            # argparse ends the process itself.
+            return int(str(stop.code)), err.getvalue()
     return code, err.getvalue()
 
 
 def is_clean(code: int, said: str, allowed: tuple[int, ...] = (0, 2)) -> bool:
     """Whether a command ended as it may: bad input is one line that can be printed."""
-    if code == 2 and said != "usage":
+    if code == 2:
         return said.startswith("error: ") and said.endswith("\n") and said[:-1].isprintable()
     return code in allowed
 

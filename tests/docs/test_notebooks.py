@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,21 @@ def test_a_notebook_was_executed_from_top_to_bottom_without_an_error(file):
         "execute_result",
     }
     assert file.stat().st_size < 500_000
+
+
+PUBLIC = {"chimera_hpc", "chimera_hpc.pipeline", "chimera_hpc.sweep"}
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_needs_no_internal_import_and_draws_by_the_public_figures(file):
+    tree = ast.parse("\n".join("".join(cell["source"]) for cell in code_cells(file)))
+    imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    imported |= {one.name for node in ast.walk(tree) if isinstance(node, ast.Import)
+                 for one in node.names}  # fmt: skip
+    assert {name for name in imported if name.startswith("chimera_hpc")} <= PUBLIC
+    assert not {name for name in imported if name.startswith("matplotlib")}
+    calls = {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    assert {"plot.space_time", "plot.profiles", "plot.variations"} <= calls
 
 
 @pytest.mark.slow

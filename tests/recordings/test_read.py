@@ -240,3 +240,10 @@ def test_second_column_of_one_name_gets_a_number(tmp_path: Path):
     assert found.u[:, 1].tolist() == [2, 4, 3]
     assert "two columns are called ch: the later is ch.1" in found.notes
     assert read(tmp_path / "u.csv", drop=("ch",)).names == ("ch.1", "b")
+
+
+def test_times_of_another_number_are_named_and_a_step_replaces_them(tmp_path: Path):
+    np.savez(tmp_path / "u.npz", t=T[:2], u=U)
+    with pytest.raises(BadInput, match=r"^.*u.npz: 2 times in t, u has the shape \(4, 3\); --step"):
+        read(tmp_path / "u.npz")
+    assert read(tmp_path / "u.npz", no_times=True).t is None
