@@ -35,12 +35,12 @@ class Command:
 
 
 COMMANDS = (
-    Command("run", "run a sweep, or go on with one, and reduce it"),
+    Command("run", "run a sweep, or continue one, and reduce it"),
     Command(
         "plan",
-        "say what a sweep would cost: points, blocks, files, bytes, core-hours; starts nothing",
+        "print what a sweep would cost: points, blocks, files, bytes, core-hours; starts nothing",
     ),
-    Command("status", "say what is done, from the store alone, while a sweep runs or after"),
+    Command("status", "print what is done, from the store alone, during or after a run"),
     Command("watch", "show the state of a sweep in the terminal until it is done"),
     Command("reduce", "make results.json, figures and the report from what is in the store"),
     Command(
@@ -51,22 +51,22 @@ COMMANDS = (
         "classify", "measure a recording of your own, and classify it by the classes of a sweep"
     ),
     Command("retry", "compute failed points once more, and reduce"),
-    Command("why", "explain what became of one point: status, tries, who computed it, with what"),
-    Command("verify", "decode what is stored, and recompute a sample of the points"),
-    Command("audit", "say how firm the classes are: recompute a sample, resample the seeds"),
+    Command("why", "explain the outcome of one point: status, tries, run, code and machine"),
+    Command("verify", "check the stored data, and recompute a sample of the points"),
+    Command("audit", "test how reliable the classes are: recompute a sample, resample the seeds"),
     Command(
         "extend", "add points to a sweep: more seeds, new values on any axis; computes nothing"
     ),
-    Command("merge", "make one sweep of several that differ in their axes only"),
+    Command("merge", "merge several sweeps that differ only in their axes"),
     Command(
         "export",
-        "write results as NetCDF, as a CSV table of the triplets, or all that matters as a zip",
+        "write results as NetCDF, as a CSV table of the triplets, or as a zip with the report",
     ),
     Command("slurm", "print the batch script of a sweep for SLURM, or submit it"),
     Command("shard", "compute one share of a sweep's blocks, straight into its store"),
-    Command("cancel", "cancel a sweep's SLURM jobs, and what a killed driver left behind"),
+    Command("cancel", "cancel a sweep's SLURM jobs, and remove what a killed driver left"),
     Command(
-        "schema", "print the JSON Schema of the job file, with which editors check and complete one"
+        "schema", "print the JSON Schema of the job file, for checks and completion in editors"
     ),
-    Command("completion", "print what lets a shell complete the command chimera-hpc"),
+    Command("completion", "print the shell completion script of chimera-hpc"),
 )

@@ -77,15 +77,15 @@ def value(metavar: str, kind: Callable[[str], Any], text: str, **more: Any) -> d
 _SET = "override a key of the job, e.g. P=3:8, seeds=4, features.start=900; may be repeated"
 _CLUSTER = (
     "serial: this process; local: worker processes here (default); scheduler-file: a Dask cluster "
-    "that is running already; slurm: worker jobs that this process submits; allocation: the tasks "
+    "that already runs; slurm: worker jobs that this process submits; allocation: the tasks "
     "of the SLURM job that this process is in"
 )
-_RESUBMIT = "go on up to N times, as the same SLURM job, when its time limit stopped it"
-_STRICT = "refuse to go on with other code, libraries or processors than the results there have"
+_RESUBMIT = "requeue the SLURM job up to N times when its time limit stops it"
+_STRICT = "refuse to continue with other code, libraries or processors than the stored results have"
 _JOB = "the job file; quickstart, paper/plane and others come with the package"
 _MEMORY = (
-    "memory of a worker, e.g. 800M or 2G: a local one is ended beyond it (default: the machine's "
-    "memory divided by the workers), SLURM is asked for it (default: 1G)"
+    "memory of a worker, e.g. 800M or 2G; a local worker that exceeds it is ended (default: the "
+    "machine's memory divided by the workers), a SLURM job requests it (default: 1G)"
 )
 _SHARED = {
     "job": value("JOB.toml", job_name, _JOB),
@@ -94,10 +94,10 @@ _SHARED = {
     "--set": value("KEY=VALUE", str, _SET, dest="overrides", action="append", default=[]),
     "--out": value("DIR", path_name, "the sweep's folder (default: results/NAME)"),
     "--block": value("N", int, "points per block (default: chosen from the cost)"),
-    "--yes": flag("accept a plan of absurd size"),
+    "--yes": flag("accept a very large plan"),
     "--json": flag("print one JSON object"),
     "--cluster": {"default": "local", "choices": CLUSTERS, "help": _CLUSTER},
-    "--scheduler-file": value("FILE", path_name, "file that its scheduler wrote"),
+    "--scheduler-file": value("FILE", path_name, "file that the running scheduler wrote"),
     "--workers": value("N", int, "worker processes (default: one per core)"),
     "--mem": value("SIZE", memory_size, _MEMORY),
     "--memory": value("SIZE", memory_size, SUPPRESS),
@@ -109,7 +109,7 @@ _SLURM = {
     "--partition": value("NAME", str, "partition of the jobs"),
     "--account": value("NAME", str, "account that they are charged to"),
     "--time": value("LIMIT", str, "time limit of a job, e.g. 30 or 1-12:00:00"),
-    "--interface": value("NAME", str, "network of scheduler and workers"),
+    "--interface": value("NAME", str, "network interface of scheduler and workers"),
 }
 EXECUTOR = ("--cluster", "--scheduler-file", "--workers", "--mem", "--memory")
 """Arguments for where the work is done."""

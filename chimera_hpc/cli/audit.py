@@ -22,11 +22,11 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep audit results/quickstart --points 100 --seed 1
 
 A sample of the points, spread evenly over the cells, is computed again in three ways: at 100 times
-tighter tolerances; from a start moved by 1e-13, which is the control, for runs near the border of
-two classes are chaotic; and over a run five times as long, analysed over its last stretch. All
-runs are labelled by the classes of the last reduction. And the seeds of every cell are resampled:
-how often its modal class stays. results.json keeps the result under "audit" while points and
-classes stay as they are; figures and report show it. The points in the store are only read.
+tighter tolerances; from an initial state moved by 1e-13 (the control, because runs near the border
+of two classes are chaotic); and over a run five times as long, analysed at its end. All runs are
+labelled by the classes of the last reduction. The seeds of every cell are also resampled, to find
+how often its modal class stays the same. results.json keeps the result under "audit" until points
+or classes change; figures and report show it. The stored points do not change.
 """
 _SHARE = 0.05
 
@@ -36,9 +36,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser,
         *("folder", "--json"),
         share=value("X", float, f"share of points to compute again, 0 to 1 (default: {_SHARE})"),
-        points=value("N", int, "number of points instead"),
+        points=value("N", int, "number of points to compute again, in place of --share"),
         seed=value("K", int, "chooses the sample", default=0),
-        workers=value("N", int, "processes here (default: one per core; 1: this one)"),
+        workers=value("N", int, "worker processes (default: one per core; 1: no other process)"),
         no_figures=flag("results.json only"),
     )
 

@@ -14,8 +14,8 @@ from chimera_hpc.run.slurm.script import job_name
 EPILOG = """examples:
   python -m chimera_hpc.sweep cancel results/quickstart
 
-Jobs are found by their name, which follows from the path of the store; only yours are looked at.
-What they have done stays, and `run` or another job goes on from there.
+Your jobs are found by their name, which depends on the path of the store. Finished points stay, and
+`run` or another job continues from there.
 """
 
 

@@ -27,13 +27,12 @@ EPILOG = """examples:
 
 FILE is a time series, time by node: .npz, .npy, .csv (.tsv, .txt, .dat; .gz), .mat, .h5, .edf,
 .bdf, .nc, or a Zarr store. Several files, a folder of files or a pattern in quotes give one table
-and one sheet of figures; without an atlas they are clustered among themselves.
-With an atlas, the reduced sweep of a similar system, a recording is brought to the sampling step of
-that sweep, measured by its settings, and gets the class of the nearest of its runs, with the
-distance to it.
-Variations of amplitude and frequency have units: --factors brings a recording in other units to
-those of the atlas, --rescale guesses the factors from the medians. What is missing is listed; files
-of pickled objects are refused.
+and one sheet of figures; without an atlas they are clustered among themselves. With an atlas (the
+reduced sweep of a similar system), a recording is interpolated to the sampling step of that sweep,
+measured with its settings, and gets the class of the nearest run, with the distance to it.
+Variations of amplitude and frequency have units: --factors converts a recording to the units of the
+atlas, --rescale estimates the factors from the medians. Missing values are listed; files with
+pickled objects are refused.
 """
 
 _NOT_SET = ("preset", "start", "groups")
@@ -45,11 +44,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     preset = "default or paper-printed: sets several settings (default: those of the atlas)"
     setting = "a setting of the table [features], e.g. n_peaks=5; may be repeated"
     along = "what to take along another dimension (NetCDF, Zarr); may be repeated"
-    what = "the recording; several, folders and patterns"
+    what = "recordings: files, folders or patterns"
     parser.add_argument("files", nargs="+", **value("FILE", path_name, what))
     add_group(
         parser,
-        "what is what in the file",
+        "contents of the file",
         variable=value("NAME", str, "array or variable of the signals"),
         time=value("NAME", str, "column, array or dimension of the times"),
         step=value("X", float, "time between two samples"),
@@ -59,7 +58,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_group(
         parser,
         "nodes and times",
-        open=flag("a chain: the last node ends it"),
+        open=flag("a chain instead of a ring"),
         links=value("FILE", path_name, "network: variations are taken over its links"),
         order=value("LIST", str, "nodes by name or number from 0, with commas; or a file"),
         drop=value("LIST", str, "columns to leave out, by name or number; or a file of them"),

@@ -31,7 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser,
         "folder",
         to=value("FILE", path_name, ".csv, .nc or .zip", required=True),
-        series=flag("the series of u too (.nc)"),
+        series=flag("also the series of u (.nc)"),
     )
 
 

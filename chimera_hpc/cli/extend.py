@@ -14,9 +14,9 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep extend jobs/quickstart.toml --set P=2:30 --out results/quickstart
   python -m chimera_hpc.sweep extend results/quickstart --set seeds=40
 
-Instead of a job file the sweep's folder may stand: its store holds the whole job. The job, with
-what is set, must hold all points of the sweep and may differ in its axes only. The new points stand
-behind the old ones, which are not touched; `run DIR` computes them.
+You may give the sweep's folder instead of a job file, because its store holds the whole job. The
+job, with its --set values, must have all points of the sweep and may differ only in its axes. The
+new points come after the old ones, which do not change; `run DIR` computes them.
 """
 
 

@@ -19,7 +19,7 @@ from chimera_hpc.run.watchdog import give_up, watchdog
 
 _EXITS = """exit status:
   0 every point has a result; 1 some failed (listed); 2 bad input (one line);
-  74 the output cannot be written; 75 stopped in good order with more to do; 130 Ctrl-C
+  74 the output cannot be written; 75 stopped cleanly, points are pending; 130 Ctrl-C
 """
 
 _INTERRUPTED = 130

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 EPILOG = """examples:
   python -m chimera_hpc.sweep merge results/seeds-0-19 results/seeds-20-39 --out results/all
 
-The sweeps may overlap. A point that several of them have is taken from the first that has a result
-for it; where their results differ it is listed, and the exit status is 1.
+The sweeps may overlap. A point that several sweeps have is taken from the first that has a result
+for it. If their results differ, the point is listed, and the exit status is 1.
 """
 
 

@@ -22,8 +22,8 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep plan jobs/quickstart.toml
   python -m chimera_hpc.sweep plan jobs/quickstart.toml --set seeds=100 --set keep.series=none
 
-A plan of more files than 500,000, of more core-hours than 100,000, or of more bytes than are free
-where it would be stored is refused with exit status 2, by `run` too; --yes accepts it.
+A plan with more than 500,000 files, more than 100,000 core-hours, or more bytes than are free on
+the disk is refused with exit status 2, also by `run`; --yes accepts it.
 """
 
 

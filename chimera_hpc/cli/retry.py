@@ -29,10 +29,9 @@ EPILOG = """examples:
       --set run.attempts=5 --set run.tighten=0.01
 
 Statuses: non_finite, step_too_small, step_budget, time_out, worker_lost, out_of_memory, not_started
-(behind a failed point of a chain; done together with that point). Each failed point is computed
-once; what fails again stays failed, results are never touched. --time-out and
---max-steps hold for this run in place of the sweep's own limits: they decide how far a point gets,
-not its numbers.
+(after a failed point of a chain; computed together with that point). Each failed point is computed
+once. A point that fails again stays failed; results never change. For this run, --time-out and
+--max-steps replace the sweep's own limits, which do not change the results of points that finish.
 """
 _FAILURES = {code.name.lower(): code for code in Status if code.is_failure}
 

@@ -26,8 +26,8 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep run jobs/quickstart.toml --set P=10:14 --set seeds=100 --out more
   python -m chimera_hpc.sweep run results/quickstart                       its store holds the job
 
-The same command again goes on where the sweep stopped, however it stopped. Points that ran out of
-time or memory are tried run.attempts times in all; `retry` tries failed points once more.
+The same command continues where the sweep stopped, whatever stopped it. Points that ran out of time
+or memory are tried run.attempts times in all; `retry` tries failed points once more.
 """
 
 

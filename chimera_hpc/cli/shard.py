@@ -29,8 +29,8 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep shard results/quickstart --of 16 --index 3
   python -m chimera_hpc.sweep shard jobs/quickstart.toml --of 16            plans the store, too
 
-Share i of n has the blocks i, i + n, i + 2n, ...; shares need nothing from each other, and any of
-them may be repeated. Inside of a job array --index is SLURM_ARRAY_TASK_ID.
+Share i of n has the blocks i, i + n, i + 2n, ...; shares are independent, and any of them may be
+repeated. In a job array, --index defaults to SLURM_ARRAY_TASK_ID.
 """
 _ELEMENT = "SLURM_ARRAY_TASK_ID"
 

@@ -31,11 +31,10 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep show results/quickstart P=12 --node 20 --window 2
   python -m chimera_hpc.sweep show results/quickstart P=12 seed=3 --animate film.gif
 
-The run is integrated again by the code that made the sweep, and what comes out is compared with the
-store bit for bit; exit status 1: it comes out otherwise. Values that select one cell and no seed
-show its seeds side by side, and the portrait and spectrum of the one that stands for them: of the
-most frequent class, nearest to the median of its variations. Nodes and windows count from 0, here
-and in figures.
+The run is integrated again, and the result is compared with the store bit for bit; exit status 1:
+it differs. Without a seed, the runs of a cell are drawn side by side, with the portrait and
+spectrum of a representative run: among the runs of the most frequent class, the one nearest to the
+median of their variations. Nodes and windows count from 0, here and in figures.
 """
 Array = NDArray[np.float64]
 

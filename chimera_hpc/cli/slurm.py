@@ -27,27 +27,27 @@ EPILOG = """examples:
 
 array: each element of a job array computes its share, without a scheduler; allocation: driver,
 scheduler and workers in one job; jobqueue: a small job that submits a job for each worker, for
-sites without long programs on login nodes (elsewhere: run JOB.toml --cluster slurm). A sweep begun
-in one way is finished in any other, or with `run` on a laptop. With --submit the store is planned,
-SLURM is asked whether it would take the job (sbatch --test-only), and after an array a second job
-reduces.
+sites without long programs on login nodes (elsewhere: run JOB.toml --cluster slurm). A sweep that
+was started in one way can be finished in any other, or with `run` on a laptop. --submit plans the
+store, asks SLURM whether it would accept the job (sbatch --test-only), and submits it; after an
+array, a second job reduces the sweep.
 """
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the command's arguments."""
     add(parser, "job", "--set", "--out", "--block", "--yes", "--mem", "--resubmit")
-    mode = "which way (default: array)"
+    mode = "how the sweep is run (default: array)"
     parser.add_argument("--mode", choices=MODES, default="array", help=mode)
     add_slurm(parser)
     add(
         parser,
         workers=value("N", int, "worker processes in all"),
         array=value("N", int, "elements of the job array"),
-        at_once=value("N", int, "of which run at a time, at most"),
-        drain=value("S", float, "be over S seconds before a job's time limit"),
-        submit=flag("submit it, too"),
-        no_reduce=flag("no job that reduces afterwards"),
+        at_once=value("N", int, "most elements that run at a time"),
+        drain=value("S", float, "stop S seconds before a job's time limit"),
+        submit=flag("submit the script"),
+        no_reduce=flag("no second job that reduces the sweep"),
     )
 
 

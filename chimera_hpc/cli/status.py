@@ -38,9 +38,9 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep status results/quickstart --json
   python -m chimera_hpc.sweep status results/quickstart --failures
 
-The map has one sign per cell, and colours on a terminal unless NO_COLOR is set: capital letters are
-classes (O ordered, C chimera, D disordered, S steady) once the sweep was reduced. `watch` shows
-the same again and again. The exit status is 75 as long as points are pending.
+The map has one sign per cell, in colour on a terminal unless NO_COLOR is set. After a reduction,
+capital letters are classes (O ordered, C chimera, D disordered, S steady). `watch` repeats this
+display. The exit status is 75 while points are pending.
 """
 _RECENT_BLOCKS = 64
 _PAUSE = 60.0

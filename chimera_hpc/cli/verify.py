@@ -28,8 +28,8 @@ EPILOG = """examples:
 --stored decodes every chunk and recomputes every digest from the stored bytes; --sample computes
 this share of the points again, at least one, compares digests, and says what differs in code,
 libraries or processor between the runs that made these points and now. Without either: both, with a
-sample of 0.01. Exit status 1: something is not as it was written, or comes out otherwise. --forget
-has `run` compute damaged blocks again.
+sample of 0.01. Exit status 1: stored data is damaged, or a recomputed point differs. After
+--forget, `run` computes damaged blocks again.
 """
 _SAMPLE = 0.01
 
@@ -38,7 +38,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add(
         parser,
         "folder",
-        stored=flag("decode all that is stored"),
+        stored=flag("decode every stored chunk"),
         forget=flag("forget damaged blocks: `run` computes them again"),
         sample=value("SHARE", float, "share of points, 0 to 1"),
         seed=value("N", int, "chooses the sample", default=0),

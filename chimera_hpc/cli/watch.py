@@ -22,8 +22,9 @@ EPILOG = """examples:
   python -m chimera_hpc.sweep watch results/quickstart
   python -m chimera_hpc.sweep watch /scratch/me/plane --every 10
 
-It reads the store alone: start and stop it at will, on any machine that sees the folder. It ends
-when every point was tried and no one works on the sweep, with exit status 0, or 1 if some failed.
+It only reads the store: start and stop it at any time, on any machine that sees the folder. It ends
+when every point has been tried and no process works on the sweep, with exit status 0, or 1 if some
+points failed.
 """
 _OTHER_LINES = 14
 """Lines of the screen that the map cannot have."""

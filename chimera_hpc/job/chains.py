@@ -1,4 +1,4 @@
-"""Chains of a sweep with a table [continue]: order of the points, and what a job may not ask.
+"""Chains of a sweep with a table [continue]: order of the points, and checks of the job.
 
 A chain is a block: its points differ in the axis that is followed, and in the direction, and lie
 one behind the other in the order in which they are computed.

@@ -1,4 +1,4 @@
-"""Names of the classes of a sweep: the paper's where they are earned, else letters."""
+"""Names of the classes of a sweep: the paper's names for its own system, otherwise letters."""
 
 from __future__ import annotations
 

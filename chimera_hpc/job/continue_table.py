@@ -15,8 +15,8 @@ class ContinueTable(Table):
     along: Line = Field(description="Axis of [grid] that is followed.")
     direction: Literal["forward", "backward", "both"] = Field(
         "forward",
-        description="forward: rising values; backward: falling ones; both: there and back in one "
-        "chain, whose way back starts from the last state of the way there.",
+        description="forward: rising values; backward: falling ones; both: forward, then backward "
+        "in one chain; the backward half starts from the last state of the forward half.",
     )
     settle: float = Field(
         0.0,

@@ -1,4 +1,4 @@
-"""The table [decide]: runs are spent until classes are decided and their boundaries are found."""
+"""The table [decide]: runs are added until classes are decided and their boundaries are found."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Decide(Table):
         "leads all others exceeds this.",
     )
     first: Runs = Field(5, description="Seeds that every cell gets.")
-    batch: Runs = Field(5, description="Further seeds per round of a cell that is not decided.")
-    most: Runs = Field(100, description="Most seeds of a cell; one still open then is undecided.")
+    batch: Runs = Field(5, description="Seeds that a round adds to a cell that is not decided.")
+    most: Runs = Field(100, description="Most seeds of a cell that is not decided.")
     judge: Literal["frozen", "atlas"] = Field(
         "frozen",
         description="frozen: classes come from the tree over the runs of the first round; atlas: "
@@ -41,8 +41,8 @@ class Decide(Table):
     )
     refine: dict[str, int | float] = Field(
         default_factory=dict,
-        description="Smallest distance by axis: between neighbouring cells whose decided classes "
-        "differ further cells are added, halfway, down to this distance.",
+        description="Smallest distance per axis: cells are added halfway between neighbouring "
+        "cells whose decided classes differ, down to this distance.",
     )
 
     @field_validator("refine", mode="before")

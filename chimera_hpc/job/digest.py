@@ -1,4 +1,4 @@
-"""What tells two sweeps apart: the digest of what decides their points and numbers."""
+"""The digest of a sweep: of everything that determines its points and their results."""
 
 from __future__ import annotations
 

@@ -40,14 +40,14 @@ KINDS: dict[str, tuple[Parameter, ...]] = {
         if p.name in RING_PARAMETERS
     ),
     "lattice": (
-        Parameter("columns", int, 1, "Nodes of a row; 1: one dimension.", low=1),
-        Parameter("periodic", int, 1, "Whether it closes: 1 yes, 0 no.", low=0, high=1),
+        Parameter("columns", int, 1, "Nodes per row; 1: one dimension.", low=1),
+        Parameter("periodic", int, 1, "1: periodic boundaries, 0: open ones.", low=0, high=1),
     ),
     "small_world": (_P, Parameter("rewire", float, 0.1, "Share of links rewired.", **_SHARE)),
     "scale_free": (Parameter("m", int, None, "Links of each new node.", low=1),),
     "random": (Parameter("mean_degree", float, None, "Mean number of links of a node.", low=0.0),),
     "modular": (
-        Parameter("modules", int, None, "Groups, as equal as can be.", low=1),
+        Parameter("modules", int, None, "Number of groups, as equal in size as possible.", low=1),
         Parameter("p_in", float, None, "Probability of a link within a group.", **_SHARE),
         Parameter("p_out", float, None, "Probability of a link across groups.", **_SHARE),
     ),
@@ -72,7 +72,7 @@ _LIMITS = {
     "modules": Limit("modules", (), lambda _, n: n, "a group has at least one node"),
 }
 _TURNS = ("Q", "orientation", "flips", "flip_set")
-"""Parameters that turn links and leave their number."""
+"""Parameters that reverse links and do not change their number."""
 _DIVISORS = {"columns": "n_nodes / columns rows", "layers": "layers of equal size"}
 
 

@@ -26,7 +26,7 @@ from chimera_hpc.network.network import Network
 _GIVEN = ("n_nodes", "seed")
 _KINDS: dict[Any, type[int] | type[float]] = {int: int, float: float, "int": int, "float": float}
 _SEEDS = 2**32
-"""Seeds are below this, which all generators of random numbers take."""
+"""Seeds are below this limit, so that all generators of random numbers accept them."""
 
 
 @dataclass(frozen=True, eq=False)

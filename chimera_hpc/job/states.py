@@ -1,4 +1,4 @@
-"""Sizes of the states of a sweep's points, and the checks of what starts or goes on from them."""
+"""Sizes of the states of a sweep's points, and checks of initial states and chains."""
 
 from __future__ import annotations
 

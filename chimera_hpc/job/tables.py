@@ -105,14 +105,14 @@ class Integrator(Table):
     )
     initial: Line | None = Field(
         None,
-        description="NumPy file .npz of first states in place of that ball, from the folder of the "
-        "job: arrays u (or phase) and v, (n,) for all points or (seeds, n), row s for seed s.",
+        description="NumPy file .npz with initial states in place of that ball, in the folder of "
+        "the job: arrays u (or phase) and v, (n,) for all points or (seeds, n), row s for seed s.",
     )
     initial_digest: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{16}$")] | None = Field(
         None, description="Digest of that file, which the plan fills in."
     )
-    max_steps: Count = Field(10_000_000, description="Accepted and rejected steps per point.")
-    time_out: float = Field(600.0, gt=0, description="Seconds of wall time per point.")
+    max_steps: Count = Field(10_000_000, description="Most steps per point, with rejected ones.")
+    time_out: float = Field(600.0, gt=0, description="Most wall time per point, in seconds.")
 
     @model_validator(mode="before")
     @classmethod
@@ -145,8 +145,8 @@ class Features(Table):
 
     preset: Literal["default", "paper-printed"] = Field(
         "default",
-        description="Sets those of the keys below that a job leaves out: all of the recording by "
-        "one clock, or the convention behind the numbers that the paper prints.",
+        description="Sets the keys below that a job leaves out. default: windows of one reference "
+        "node over the whole series; paper-printed: the convention behind the printed numbers.",
     )
     start: float = Field(
         950.0, ge=0, description="Start of the analysis; it ends at integrator.t_end."
@@ -156,19 +156,19 @@ class Features(Table):
     )
     n_overlap: int = Field(5, ge=0, description="Maxima that consecutive windows share.")
     max_windows: int = Field(
-        0, ge=0, le=10**6, description="Windows that count, from the first; 0: all."
+        0, ge=0, le=10**6, description="Number of windows, from the first; 0: all."
     )
     prominence: float = Field(
         0.0,
         ge=0,
-        description="Least prominence of a maximum, in the unit of u; 0: any.",
+        description="Least prominence of a maximum that counts, in the unit of u; 0: any.",
     )
     window_reference: Literal["ring", "own"] = Field(
         "ring",
-        description="Maxima that place the windows: those of one node for all, or each node's own.",
+        description="Maxima that define the windows: the reference node's, or each node's own.",
     )
     reference_node: int = Field(
-        0, ge=0, description="Node (from 0) whose maxima place the windows of all nodes."
+        0, ge=0, description="Node (from 0) whose maxima define the windows of all nodes."
     )
     phase_mean: Literal["circular", "arithmetic"] = Field(
         "circular", description="Mean of the phases over windows."
@@ -182,8 +182,8 @@ class Features(Table):
     )
     steady: Literal["apart", "level"] = Field(
         "apart",
-        description="Runs that do not oscillate: a class of their own, or clustered by the "
-        "variation of their level along the ring.",
+        description="Runs that do not oscillate: a separate class (apart), or clustered by the "
+        "variation of their mean level along the ring (level).",
     )
     steady_threshold: float = Field(
         1e-2,
@@ -241,16 +241,16 @@ class Reduction(Table):
     )
     classifier: Literal["agglomerative", "kmeans", "mixture", "hdbscan"] = Field(
         "agglomerative",
-        description="What makes the classes: the tree, cut; or scikit-learn's k-means, Gaussian "
+        description="Method that makes the classes: the tree; or scikit-learn's k-means, Gaussian "
         "mixture or HDBSCAN, which finds the number of classes by itself.",
     )
     cuts: Annotated[
         tuple[Annotated[int, Field(ge=2, le=1000)], ...],
         BeforeValidator(as_tuple),
         AfterValidator(_different),
-    ] = Field((3, 4, 5), description="Numbers of clusters, side by side.")
+    ] = Field((3, 4, 5), description="Numbers of clusters; each gives a cut.")
     depth: float | None = Field(
-        None, gt=0, description="Cut of the dendrogram at this distance, too."
+        None, gt=0, description="Distance at which the dendrogram is also cut."
     )
     names: Annotated[str | tuple[str, ...], BeforeValidator(_names)] = Field(
         "triplet",
@@ -268,15 +268,15 @@ class Reduction(Table):
         "values that are not given are those of the sweep's first point.",
     )
     figures: Annotated[str | Texts, BeforeValidator(check_figures)] = Field(
-        "auto", description='"auto", all that fit, or a list of the names of figures.'
+        "auto", description='"auto", all that have data, or a list of the names of figures.'
     )
     analyses: Annotated[Texts, BeforeValidator(check_analyses)] = Field(
-        (), description="What else is made of the points, for results.json: names of analyses."
+        (), description="Names of the analyses whose results go into results.json."
     )
     atlas: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
         (),
-        description="Sweeps whose classes judge the runs: folders next to this one, or paths. The "
-        "first judges, the others are the check.",
+        description="Reduced sweeps whose classes the runs get: folders next to this one, or "
+        "paths. The first gives the classes, the others are a check.",
     )
     beside: Annotated[tuple[Line, ...], BeforeValidator(_as_words)] = Field(
         (), description="Sweeps whose curves are drawn with this one's: folders next to this one."
@@ -329,7 +329,7 @@ class Run(Table):
 
     block: int = Field(0, ge=0, le=10**8, description="Points per block; 0: chosen from the cost.")
     workers: int = Field(0, ge=0, le=10**6, description="Worker processes; 0: one per core.")
-    attempts: int = Field(2, ge=1, le=100, description="Tries of a point that fails.")
+    attempts: int = Field(2, ge=1, le=100, description="Most tries of a point that fails.")
     tighten: float = Field(
         0.1, gt=0, le=1, description="Factor on rtol and atol at each further try."
     )
@@ -357,7 +357,7 @@ class Slurm(Table):
     workers: Count | None = Field(None, description="Worker processes in all.")
     array: Count | None = Field(None, description="Elements of the job array.")
     at_once: Count | None = Field(
-        None, description="Elements of the job array that run at a time, at most."
+        None, description="Most elements of the job array that run at a time."
     )
     setup: Lines = Field((), description="Shell lines before the work: modules, environments.")
     extra: Lines = Field((), description="Further options of sbatch, one per line.")

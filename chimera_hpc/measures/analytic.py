@@ -147,7 +147,7 @@ def wavelet_features(
 
 
 def _looked_at(name: str, t: ArrayLike, u: ArrayLike) -> CheckedSignals:
-    """Return checked signals, and warn of those that are hardly meant, as `fourier_features`."""
+    """Return checked signals, and warn of unlikely signals, as `fourier_features` does."""
     given = checked_signals(t, u)
     finite = np.isfinite(given.x).all(axis=1)
     if not finite.all():

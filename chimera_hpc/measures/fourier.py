@@ -245,7 +245,7 @@ def measure_signals(
     steady: Steady = "apart",
     **options: Any,
 ) -> NodeFeatures:
-    """Do as `fourier_features`, without a look at what the signals are."""
+    """Do as `fourier_features`, without the warnings about unlikely signals."""
     choice("phase_mean", phase_mean, get_args(PhaseMean))
     choice("steady", steady, get_args(Steady))
     found = window_lines(t, u, **options)

@@ -1,6 +1,6 @@
 """Time series: transposition to contiguous nodes, and rounding to integers.
 
-Long series take the memory of a machine, so that two signals are turned within their own.
+Long series fill much of the memory, so two signals are transposed in place.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def maxima(x: NDArray[np.float64], prominence: float = 0.0, at_most: int | None 
 def hidden_windows(
     signals: NDArray[np.float64], n_peaks: int, prominence: float
 ) -> NDArray[np.bool_]:
-    """Whether each of signals (N, T) has a window only without the limit `prominence`."""
+    """Whether each of signals (N, T) has windows, but none with the limit `prominence`."""
     counts = [(len(maxima(x, prominence)), len(maxima(x))) for x in signals]
     return np.array([few < n_peaks <= many for few, many in counts])
 

@@ -261,14 +261,14 @@ PARAMETERS = ModelParameters(
     n_nodes=ring_size(50),
     parameters=(
         Parameter("P", int, None, HALF_DEGREE, low=1, high=10**7),
-        Parameter("Q", int, None, "Links reoriented at node 1, on each side.", low=0, high=10**7),
+        Parameter("Q", int, None, "Links reversed at node 0, on each side.", low=0, high=10**7),
         Parameter("orientation", int, 1, "Rule that orients the ring's links.", low=1, high=2),
         EPSILON,
         Parameter("b", float, 0.5, "Excitability."),
         Parameter("c", float, -0.01, "Self-coupling of the links."),
         Parameter("flips", int, 0, "Links reversed at random, Q_r.", low=0, high=10**15),
         Parameter(
-            "flip_set", int, 0, "Links to draw those from: 0 all, 1 node 1's.", low=0, high=1
+            "flip_set", int, 0, "Links to draw those from: 0 all, 1 node 0's.", low=0, high=1
         ),
     ),
     limits=(
@@ -278,7 +278,7 @@ PARAMETERS = ModelParameters(
             "flips",
             ("P", "flip_set"),
             lambda columns, n: np.where(columns["flip_set"] == 1, 2, n) * columns["P"],
-            "flips may not exceed the number of links, n_nodes * P (2 P of them at node 1)",
+            "flips may not exceed the number of links, n_nodes * P (2 P of them at node 0)",
         ),
     ),
     forms=("reduced", "full"),

@@ -60,7 +60,7 @@ class SimplicialComplex:
 
     @classmethod
     def _unchecked(cls, **parts: Any) -> Self:
-        """Return a value of parts that are known to fit; they are not checked again."""
+        """Return an object from parts that are known to be consistent, without checks."""
         made = object.__new__(cls)
         made._set({field.name: field.default for field in fields(cls)} | parts)
         return made
@@ -80,7 +80,7 @@ class SimplicialComplex:
 
     @property
     def kind(self) -> str:
-        """The word for it in messages: "ring" if `Network.ring` made it, otherwise "network"."""
+        """The word in messages: "ring" if `Network.ring` made it, otherwise "network"."""
         return "ring" if self.half_degree else "network"
 
     @property

@@ -126,7 +126,7 @@ def _within(n: int, p: float, rng: np.random.Generator) -> Integers:
 
 
 def _chosen(count: int, p: float, rng: np.random.Generator) -> Integers:
-    """Return which of so many are chosen, each with probability p, in time of those that are."""
+    """Return which of so many are chosen, each with probability p; takes time per chosen one."""
     if p in (0.0, 1.0):
         return np.arange(count if p else 0)
     at, found = -1, []

@@ -1,4 +1,4 @@
-"""Where a picture of a network has its nodes, and in which order its signals are drawn."""
+"""The places of the nodes in a picture of a network, and the order in which signals are drawn."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def node_places(network: Network, layout: str | ArrayLike = "auto") -> Array:
 
     "circular" has them on a circle clockwise from the top, in the order of `picture_order`.
     "spring" draws linked nodes together and pushes others apart: the layout of Fruchterman and
-    Reingold, of more than `MOST_SPRING` nodes a faster one; both are the same in every call. Parts
-    that are not connected, and nodes without links, lie side by side, the largest at the top left.
-    "auto" is circular for rings and dense networks, and spring for others. An array (N0, 2) gives
-    the places; they are scaled to fit.
+    Reingold, or a faster one above `MOST_SPRING` nodes. Both give the same places in every call.
+    Parts that are not connected, and nodes without links, lie side by side, the largest at the top
+    left. "auto" is circular for rings and dense networks, and spring for others. An array (N0, 2)
+    gives the places; they are scaled to fit.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Other people's time series: read, prepared, measured, judged or clustered."""
+"""Reads, prepares, measures and classifies time series of other models or experiments."""
 
 from chimera_hpc.base.public import load_on_use
 

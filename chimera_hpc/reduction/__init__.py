@@ -1,1 +1,1 @@
-"""From a store to what people read: classes, results.json, analyses, tables, exports."""
+"""Turns a store into results for people: classes, results.json, analyses, tables, exports."""

@@ -56,7 +56,7 @@ def agreement_lines(entry: Agreement) -> list[str]:
 
 
 def remarks(entry: Agreement) -> list[str]:
-    """Return what is to be known of the numbers, a line each; results of before have none."""
+    """Return remarks on the numbers, one per line; results of earlier versions have none."""
     return [entry["remark"]] if entry.get("remark") else []
 
 

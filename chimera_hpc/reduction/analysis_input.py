@@ -1,4 +1,4 @@
-"""What an analysis may look at."""
+"""The input of an analysis."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class AnalysisInput:
     """Time (T,) and u (T, N) of a point by its index."""
 
     def scalar(self, name: str) -> Array:
-        """Return one of the scalars (n,); raise BadInput when the job's measures have it not."""
+        """Return one of the scalars (n,); raise BadInput if the job's measures do not have it."""
         if name not in self.scalars:
             raise BadInput(f"measures.panel has no measure that gives {name}")
         return self.scalars[name]

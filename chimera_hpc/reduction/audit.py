@@ -1,10 +1,11 @@
-"""The error bar of a phase diagram: how firm the labels of a sweep's runs are.
+"""The error bar of a phase diagram: how reliable the labels of a sweep's runs are.
 
 A sample of the points is computed again in three ways (see `audit_runs`): at 100 times tighter
-tolerances, from a start moved by 1e-13, and over a run five times as long. All runs are labelled by
-the frozen classes of the last reduction. Trajectories near the border of two classes are chaotic,
-so what changes at tighter tolerances is compared with what the moved start changes, which is the
-control. The seeds of every cell are resampled, too: how often its modal class stays.
+tolerances, from an initial state moved by 1e-13, and over a run five times as long. All runs are
+labelled by the frozen classes of the last reduction. Trajectories near the border of two classes
+are chaotic, so the changes at tighter tolerances are compared with those of the moved initial
+state, the control. The seeds of every cell are also resampled, to find how often its modal class
+stays the same.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class Labeller:
     name: str
     """In words."""
     atlas: Atlas | None
-    """None: runs are told apart by whether they end inside the ball that they began in."""
+    """None: the label says whether a run ends inside the ball in which it started."""
 
     @classmethod
     def of(cls, store: Store, own: Atlas, others: Mapping[str, Atlas]) -> Labeller:
@@ -100,7 +101,7 @@ class Labeller:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """What an audit stands on: the points of a sweep with their labels and classes."""
+    """The basis of an audit: the points of a sweep with their labels and classes."""
 
     store: Store
     ledger: Mapping[str, Integers]
@@ -111,7 +112,7 @@ class Basis:
 
     @property
     def key(self) -> str:
-        """Digest: another one means that an earlier audit says nothing any more."""
+        """Digest: if it has changed, an earlier audit is no longer valid."""
         state = blake2b(digest_size=16)
         words = [list(self.labels), [[k, list(names)] for k, (_, names) in self.cuts.items()]]
         state.update(json.dumps([[s.digest for s in self.store.sweeps], *words]).encode())
@@ -131,8 +132,9 @@ def audit_sweep(
 ) -> dict[str, Any]:
     """Audit a reduced sweep, and write what was found into results.json under ``audit``.
 
-    The store is read only. Killed at any moment, results.json is whole, old or new. Labels under
-    the other conventions of the sweep's panel are compared too, for the same runs.
+    The store is read only. After a kill at any moment, results.json is complete, in its old or its
+    new state. Labels under the other conventions of the sweep's panel are compared too, for the
+    same runs.
 
     folder: a sweep's folder, the one that holds store.zarr.
     workers: worker processes on this machine; below 2 this process computes. The result is the

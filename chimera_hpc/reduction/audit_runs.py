@@ -34,7 +34,7 @@ Task = tuple[Path, Integers, str]
 
 
 class Computed(NamedTuple):
-    """What n runs came to."""
+    """The results of n runs."""
 
     status: Integers
     """(n,)"""
@@ -67,7 +67,7 @@ class Runs(NamedTuple):
 def variant(sweep: Sweep, way: str) -> tuple[Sweep, float]:
     """Return the sweep that a way computes, and how far it moves the initial states.
 
-    A longer run is analysed over the last stretch of it, as long as the sweep's own.
+    The analysis interval of a longer run is at its end and as long as the sweep's own.
     """
     spec, features = sweep.integrator, sweep.features
     limits = {
@@ -108,13 +108,13 @@ def compute_again(
 ) -> dict[str, Computed]:
     """Compute points of a store once more in each of the ways.
 
-    What comes out does not depend on the number of workers.
+    The results do not depend on the number of workers.
 
     chosen (m,): points by their numbers.
     workers: worker processes on this machine; below 2 this process computes.
     on_piece: called with the number of runs of each piece that has been done.
 
-    Raises BadInput: A point cannot be computed, as when a user's model is not what it was.
+    Raises BadInput: A point cannot be computed, for example because a user's model has changed.
     """
     pieces = np.array_split(chosen, max(1, -(-len(chosen) // _PIECE)))
     # The longest ones first, so that no worker is left with one at the end.

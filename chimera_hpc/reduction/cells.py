@@ -1,4 +1,4 @@
-"""Which axes of a sweep are free, and how points and cells are called."""
+"""Which axes of a sweep vary independently, and the names of points and cells."""
 
 from __future__ import annotations
 

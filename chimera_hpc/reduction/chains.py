@@ -1,4 +1,4 @@
-"""What chains of points show: classes and an order parameter along them, thresholds, hysteresis."""
+"""The results of chains: classes and an order parameter along them, thresholds, hysteresis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sweep with [decide] has found: decided cells, boundaries, and what the judge costs."""
+"""The results of a sweep with [decide]: decided cells, boundaries, agreement of the judge."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def standing_by(
 ) -> Standing | None:
     """Return how far the cells are decided; None without [decide], and without its judge.
 
-    Under another convention than the sweep's own, the votes are those of that convention, of the
-    runs that the own one asked for.
+    Under a convention other than the sweep's own, the votes follow that convention, for the runs
+    that the sweep's own convention chose.
     """
     sweep, atlas = store.sweep, None
     if sweep.decide is None:

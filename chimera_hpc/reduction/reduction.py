@@ -1,4 +1,4 @@
-"""The reduction of a sweep: store in; classes, results.json, a table and figures out."""
+"""The reduction of a sweep: from the store to classes, results.json, a table and figures."""
 
 from __future__ import annotations
 
@@ -74,10 +74,11 @@ def reduce_sweep(
 ) -> Summary:
     """Classify the points that are done, and write all that follows from them.
 
-    Writes the store's group ``reduction``, results.json and the folder figures. A store that is
-    not finished is reduced as far as it is done, and one without a run that oscillates too. Killed
-    at any moment, each file is whole, old or new, and another reduction puts all of them right.
-    What the panel measures under another convention is reduced too (see `conventions`).
+    Writes the store's group ``reduction``, results.json and the folder figures. An unfinished store
+    is reduced as far as it is done; a store without an oscillating run is reduced too. After a kill
+    at any moment, each file is complete, in its old or its new state, and another reduction makes
+    all of them consistent. What the panel measures under another convention is reduced too (see
+    `conventions`).
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def reduce_sweep(
     Raises
     ------
     BadInput
-        No store in the folder, or a point to replay that the model cannot be given.
+        No store in the folder, or a point to replay that the model cannot compute.
     DamagedChunk
         A chunk of results that the ledger vouches for is missing or damaged.
     """
@@ -332,7 +333,7 @@ class _Work:
         )
 
     def _kept(self) -> dict[int, NDArray[np.float64]]:
-        """How often each cell keeps its modal class, by cut, where there is an audit."""
+        """How often each cell keeps its modal class, by cut, if there is an audit."""
         found = self.results.get("audit", {"bootstrap": {"kept": {}}})["bootstrap"]["kept"]
         return {int(k): np.array(shares, dtype=np.float64) for k, shares in found.items()}
 

@@ -1,4 +1,4 @@
-"""Points of a sweep computed again, with the same kernels, to be looked at."""
+"""Recomputes points of a sweep with the same kernels, for pictures."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ class Replay:
 
     @property
     def is_same(self) -> bool:
-        """Whether the same came out as is stored, bit for bit."""
+        """Whether the result is the stored one, bit for bit."""
         return self.digest == self.stored
 
     @property
     def begins(self) -> bool:
-        """Whether there is anything to see."""
+        """Whether there is anything to draw."""
         return bool(np.isfinite(self.u.at(slice(0, 1))).any())
 
     @property
@@ -184,7 +184,7 @@ def representative(store: Store, chosen: Sequence[int]) -> int:
 def window_spectrum(
     t: Array, u: NodeSeries, settings: Features, node: int, window: int
 ) -> tuple[Spectrum, str]:
-    """Return what the Fourier method saw of one node in one window, and a line that says it.
+    """Return the Fourier fit of one node in one window, and a line that describes it.
 
     t (T,), u (N, T): a run that was measured by these settings, and oscillates; node, window: both
     from 0. Only the node and the one whose maxima place the windows are read.
@@ -231,5 +231,5 @@ def _title(store: Store, i: int, name: str | None) -> str:
 
 
 def has_nullcline(sweep: Sweep) -> bool:
-    """Whether the model's first variable stands still on w = u - u^3 / 3 where it is alone."""
+    """Whether w = u - u^3 / 3 is the nullcline of the model's first variable, without coupling."""
     return sweep.model == "topological_fhn"

@@ -1,4 +1,4 @@
-"""The points that a job asks to be drawn: found in the sweep, or made."""
+"""The points that a job asks to be drawn: points of the sweep, or others that are computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the classes of a tree can be relied on: trees of a sample, cuts between equal merges."""
+"""How reliable the classes of a tree are: trees of a sample, cuts between equal merges."""
 
 from __future__ import annotations
 

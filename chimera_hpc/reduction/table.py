@@ -17,7 +17,7 @@ Cells = Sequence[Mapping[str, Any]]
 
 MOST_LINES = 60
 WIDTH = 100
-"""Limits of a table for the terminal; beyond them it says less."""
+"""Limits of a table for the terminal; a larger table is shortened."""
 DECIDED = "decided"
 """Stands for a cut: the classes by which the cells of a sweep with [decide] are decided."""
 _NOTHING = "."

@@ -1,4 +1,4 @@
-"""The report of a sweep: one HTML file with map, tree, projections, pictures, failures."""
+"""Writes the report of a sweep: one HTML file with map, tree, projections, pictures, failures."""
 
 from chimera_hpc.report.page import REPORT, Report, write_report
 

@@ -1,1 +1,1 @@
-"""Computing a sweep: blocks of work, executors, clusters, signals, progress."""
+"""Computes a sweep: driver, executors, Dask clusters, SLURM, adaptive rounds, signals, progress."""

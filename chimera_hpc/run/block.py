@@ -1,4 +1,4 @@
-"""The science of one block: points in, arrays out. A pure function, without Dask and Zarr.
+"""The computation of one block: points in, arrays out. A pure function, without Dask and Zarr.
 
 The arrays of a point depend on the point and on the code, not on its neighbours in the block.
 """
@@ -95,9 +95,9 @@ def store_as(u: Array, stored: NDArray[Any]) -> bool:
 def as_measured(u: Array, w: Array, stored: NDArray[Any], fits: bool) -> tuple[Array, Array]:
     """Return u as the store gives it back, and w, both (N, T) with contiguous rows.
 
-    What is measured is what is stored: a maximum between two nearly equal samples would otherwise
-    move to the other one, and its window with it, when the features are recomputed from the
-    store. Values beyond the range of int16, which the store does not keep, are rounded alike.
+    Features are measured on the stored values. Otherwise, when they are recomputed from the store,
+    a maximum could move between two nearly equal samples, and its window with it. Values beyond the
+    range of int16, which the store does not keep, are rounded alike.
 
     stored (T, N), fits: what `store_as` made of u. The memory of u and w is used again, if it can
     be: a long run has no other of this size.
@@ -284,7 +284,8 @@ class _Block:
 def _carried(model: Model, u: Array, v: Array) -> Array:
     """Return a last state as one array, u then v, to start another run from.
 
-    Phases come back to [-pi, pi]: they would grow along a chain, and the tolerance with them.
+    Phases are wrapped to [-pi, pi]: they would grow along a chain, and the error that the relative
+    tolerance allows with them.
     """
     if isinstance(model, PhaseModel):
         u = np.angle(np.exp(1j * u))

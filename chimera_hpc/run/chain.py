@@ -1,4 +1,4 @@
-"""A chain in work: the states that its points start from, and results that are not yet written."""
+"""A chain that is being computed: states to start points from, and results not yet written."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ WRITING_SHARE = 0.05
 class Chain:
     """The points of one block, each of which starts from the last state of the one before.
 
-    A point behind one that failed is not started: a first state of its own would put it on another
-    branch than the one that is followed.
+    A point after a failed one is not started: an initial state of its own could put it on another
+    branch.
 
     write: called with results, their number of tries and their rows in the block.
     """
@@ -55,7 +55,7 @@ class Chain:
         return row > 0 and bool(np.isnan(self.states[row - 1]).all())
 
     def take(self, row: int, result: BlockResult, tries: int) -> None:
-        """Take the result of one point, and write all that are held from time to time."""
+        """Take the result of one point; write the results that are held from time to time."""
         assert result.state is not None
         self.states[row] = result.state[0]
         if tries != self._tries:

@@ -1,4 +1,4 @@
-"""Trying a user's model before it is trusted with a sweep."""
+"""Tests of a user's model before a sweep."""
 
 from __future__ import annotations
 

@@ -58,9 +58,9 @@ class ExecutorChoice:
     ) -> Iterator[Cluster]:
         """Start or join the chosen cluster.
 
-        store: what the workers work on.
+        store: the store that the workers write.
         n_blocks: blocks to be computed; SLURM is asked for no more workers than that.
-        say: takes lines for people.
+        say: called with each line for the user.
         patience: seconds after which a worker that gives no sign of life is given up.
         meanwhile: what to do in a thread while local workers start.
         """

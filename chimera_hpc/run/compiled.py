@@ -1,4 +1,4 @@
-"""Which kernels are on the disk already: a process need not load numba to find out.
+"""Which kernels are already compiled on the disk, found without loading numba.
 
 A file next to the compiled kernels names them. Its own name depends on all that decides which
 kernels a sweep needs.

@@ -1,4 +1,4 @@
-"""Driving a store to its end: the runs of ``run`` and ``retry``, whatever happens on the way."""
+"""The driver of ``run`` and ``retry``: computes everything that a store lacks, despite failures."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Refreshing(Protocol):
 
 
 class Driver:
-    """Works a store through, and knows afterwards what is in the way of its end."""
+    """Computes what a store lacks, and records what prevents its completion."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class Driver:
         self.store, self.executor, self.stop = store, executor, stop
         self.retry, self.strict, self.log = retry, strict, log
         self.ended_by: str | None = None
-        """What made going on hopeless, on one line."""
+        """Why the run cannot continue, on one line."""
         self.broken: dict[int, BlockError] = {}
         """Blocks that were left for a later run, and why."""
         self._errors: Counter[int] = Counter()
@@ -79,9 +79,9 @@ class Driver:
         """The command line of this process, if it runs nothing else."""
 
     def work(self) -> None:
-        """Do what is left of the store until nothing is left, or to stop.
+        """Compute what is left of the store until nothing is left or a stop is requested.
 
-        Raises BadInput for what only another job, or another model, can put right.
+        Raises BadInput for errors that only another job or another model can correct.
         """
         try:
             workers = self.executor.n_workers
@@ -94,7 +94,7 @@ class Driver:
             raise BadInput(self._refused)
 
     def should_stop(self) -> bool:
-        """Return whether a signal asked to stop, or going on has become hopeless."""
+        """Return whether a signal asked to stop, or the run cannot continue."""
         if self.ended_by is None and time_to_leave():
             self.ended_by = NEAR
         return self.stop() or self.ended_by is not None
@@ -144,7 +144,7 @@ class Driver:
                 self.reporter.say(f"warning: {line}")
 
     def _count(self) -> None:
-        """Have the reporter count what the ledger says, by whichever run."""
+        """Set the counts of the reporter from the ledger, for points of all runs."""
         retry, ledger = self.retry, self.store.ledger()
         to_do = unfinished(ledger, retry.attempts, retry.statuses, retry.before)
         to_do = with_those_behind(to_do, ledger["status"], self.store.block_size)
@@ -213,7 +213,7 @@ class Driver:
             watchdog.on_hang, watchdog.on_stop = before
 
     def _give_back(self, message: RunMessage) -> None:
-        """Leave the blocks in hand to another process: this one is stopped in its model."""
+        """Release the current blocks: this process is stopped while its model computes."""
         from chimera_hpc.run.work import hand_back_all
 
         hand_back_all()
@@ -221,7 +221,7 @@ class Driver:
         self.reporter.close()
 
     def _start_again(self, text: str, message: RunMessage) -> None:
-        """Have the same command in the place of this process, whose model does not return."""
+        """Replace this process, whose model does not return, by the same command."""
         from chimera_hpc.run.work import blame_model
 
         blame_model()
@@ -285,9 +285,9 @@ class Driver:
             yield block
 
     def _rounds(self) -> Iterator[list[int]]:
-        """Yield the blocks that are free, again and again, until nothing is left or to stop.
+        """Yield the free blocks repeatedly until nothing is left or a stop is requested.
 
-        Blocks in other hands are waited for: their owner may die.
+        It waits for blocks that other processes own, because an owner may die.
         """
         wait = 0.25
         while not self.should_stop():
@@ -317,7 +317,7 @@ class Driver:
             time.sleep(0.05)
 
     def _note(self, message: RunMessage, receipt: BlockReceipt) -> None:
-        """Take a receipt to the books."""
+        """Record a receipt."""
         self._work_done += BlockWork(receipt.n_done + receipt.n_failed, receipt.seconds)
         is_new = bool(receipt.machine) and receipt.machine not in self._machines
         if is_new:

@@ -1,8 +1,8 @@
-"""Working through the blocks of a store: one after the other, or over a Dask cluster.
+"""The executors: compute the blocks of a store one after the other, or on a Dask cluster.
 
-The serial executor is the specification: every other one calls the same `work.do_block` on the same
-blocks and leaves the same bytes. What is done is known from the store alone; an executor that is
-killed loses the blocks in flight and nothing else.
+The serial executor is the reference: every other one calls the same `work.do_block` on the same
+blocks and leaves the same bytes. Only the store records what is done; an executor that is killed
+loses only its current blocks.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class ClusterLost(RuntimeError):
 def do_block(
     message: RunMessage, block: int, local_stop: Callable[[], bool] | None = None
 ) -> BlockReceipt:
-    """Do a block in this process, which loads what integrates first; see `work.do_block`."""
+    """Compute a block in this process, which first loads the integrator; see `work.do_block`."""
     from chimera_hpc.run import work
 
     return work.do_block(message, block, local_stop)
@@ -168,7 +168,7 @@ class _Window:
         return BlockReceipt(block, error=BlockError(text, text))
 
     def look_after(self) -> None:
-        """Count the workers from time to time, and see to it that there are any."""
+        """Count the workers from time to time; raise ClusterLost if there is none for too long."""
         now = time.monotonic()
         if now - self.counted < _COUNT_SECONDS:
             return

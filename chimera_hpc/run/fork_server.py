@@ -1,6 +1,6 @@
 """The fork server of multiprocessing, from which the workers of a local cluster are forked.
 
-It imports once what every worker needs. Where the platform has none, workers are spawned.
+It imports once what every worker needs. On platforms without a fork server, workers are spawned.
 """
 
 from __future__ import annotations

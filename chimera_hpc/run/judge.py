@@ -1,6 +1,6 @@
-"""The judge of a sweep with [decide]: the classes of its runs while it goes on.
+"""The judge of a sweep with [decide]: gives its runs their classes during the rounds.
 
-It does not change from round to round, so the class of a run never does either.
+It is the same in every round, so the class of a run never changes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The only maker of Dask clusters: on this machine, or one that is already running."""
+"""Dask clusters on this machine, or one that already runs; `run.slurm` makes the others."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def _connected(scheduler_file: Path, patience: float) -> Client:
 
 
 def _calm_scheduler(patience: float) -> type[Scheduler]:
-    """Return a scheduler that its workers need not tell twice a second that they are there.
+    """Return a scheduler to which workers send a heartbeat less often than twice per second.
 
     Each time takes 3 ms of the cores that integrate.
     """
@@ -187,7 +187,7 @@ def _prepare(client: Client) -> None:
 
 
 def _close(cluster: SpecCluster) -> None:
-    """Close a cluster; one that does not close, as after a worker was lost, is left behind."""
+    """Close a cluster; give up on one that does not close, for example after a lost worker."""
     try:
         cluster.close(timeout=_CLOSE_SECONDS)
     except TimeoutError:
@@ -195,7 +195,7 @@ def _close(cluster: SpecCluster) -> None:
 
 
 def _kill_workers(cluster: SpecCluster) -> None:
-    """End all workers at once: what they have in hand is given up."""
+    """End all workers at once; their current blocks are lost."""
     for nanny in cluster.workers.values():
         nanny.auto_restart = False
         if nanny.process is not None and nanny.process.pid:

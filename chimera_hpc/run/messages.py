@@ -1,6 +1,6 @@
 """What a run tells its workers, and what they answer for each block.
 
-Kept apart from `work`, so that a driver whose workers integrate need not load what integrates.
+This is separate from `work`, so that a driver whose workers integrate need not load the integrator.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class RunMessage:
 
 @dataclass(frozen=True)
 class BlockError:
-    """Why a block could not be done, though none of its points is to blame as far as we know."""
+    """Why a block could not be computed, although no point of it is known to be the cause."""
 
     text: str
     """One line for people."""
@@ -84,17 +84,17 @@ class BlockReceipt:
     n_failed: int = 0
     seconds: float = 0.0
     taken: bool = False
-    """Somebody else was at it."""
+    """Another process owns the block."""
     stopped: bool = False
-    """The run was told to stop before the block was whole."""
+    """The run was told to stop before the block was complete."""
     late: bool = False
-    """It was not begun, or not ended: too little is left of the batch job's time."""
+    """It was not started or not finished, because the time left of the batch job is too short."""
     error: BlockError | None = None
     machine: str = ""
     """Where it was computed."""
 
 
 def tell_to_stop(message: RunMessage) -> None:
-    """Tell all workers of a run to stop in good order; on a full disk they find out themselves."""
+    """Tell all workers of a run to stop cleanly; on a full disk they notice by themselves."""
     with suppress(OSError):
         message.stop_file.touch()

@@ -1,4 +1,4 @@
-"""Telling how a run goes: a bar on a terminal, plain lines elsewhere, the same lines in run.log."""
+"""The progress of a run: a bar on a terminal, plain lines elsewhere, the same lines in run.log."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Reporter:
             self._bar.update(self._task, total=total)
 
     def count(self, done: int, failed: int) -> None:
-        """Take over the number of points that need nothing more, and of those that failed."""
+        """Set the number of points that need no more work, and of those that failed."""
         self.done, self.failed = done, failed
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=done)

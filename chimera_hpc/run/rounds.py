@@ -1,8 +1,7 @@
 """The rounds of a sweep with [decide]: how far its cells are decided, and what comes next.
 
-The next round is a pure function of what the store holds: its ledger, its features and its specs,
-and of the atlas where one judges.
-So a run that was killed chooses the same points again, and so does another process.
+The next round is a pure function of the contents of the store (ledger, features, specs) and of the
+atlas, if one judges. A run that was killed, or another process, therefore chooses the same points.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class Standing:
 
     @property
     def cut(self) -> Cut:
-        """The judge's classes of all runs as a cut, though of no tree over them."""
+        """The judge's classes of all runs as a cut, which belongs to no tree of these runs."""
         names, unknown = self.judge.names, np.full((len(self.judge.names), 3), np.nan)
         return Cut(self.labels, names, names, unknown, self.judge.sizes, np.nan)
 
@@ -67,7 +66,7 @@ class Standing:
 
     @cached_property
     def open(self) -> NDArray[np.bool_]:
-        """Cells that get further runs. One whose runs all failed does not."""
+        """Cells that get further runs. A cell whose runs have all failed gets none."""
         possible = self.votes.any(axis=1) & (self.runs < self.decide.most)
         return np.asarray(possible & ~self.found.decided)
 
@@ -195,7 +194,7 @@ def _with_followers(
 def next_round(store: Store) -> Store | None:
     """Extend a store by the points of its next round and return it; None when there is none.
 
-    Where another process has extended it already, its points are returned.
+    If another process has already extended it, that extension is returned.
     """
     present = Store.open(store.path, store.sweep.origin)
     if present.n_points > store.n_points:

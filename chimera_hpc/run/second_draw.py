@@ -1,4 +1,4 @@
-"""Points of a user's model built in a second process, to see whether they come out the same.
+"""Builds points of a user's model again in a second process and compares them.
 
 What differs between processes, such as a global random generator, an array that is drawn at import
 or the order of a set, would give each worker another model.

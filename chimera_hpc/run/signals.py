@@ -1,4 +1,4 @@
-"""Stopping in good order: what the signals of people and of batch systems ask for."""
+"""Clean stops: the signals of users and batch systems."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One trajectory: the library's door to models, networks and the integrator."""
+"""One trajectory: the interface of the library to models, networks and the integrator."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """A thread that notices when a model does not return, and then ends or replaces the process.
 
-A compiled right-hand side cannot be interrupted: no signal and no exception gets into it. It
-releases the GIL, so a thread can do what is left to do: leave word at the claims, and end the
-process. A request to stop ends it too, if the model does not let Python take the signal.
+A compiled right-hand side cannot be interrupted by a signal or an exception. It releases the GIL,
+so a thread can still record the reason in the claims and end the process. A request to stop ends it
+too, if the model does not let Python take the signal.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ def say(text: str, what: str = "error") -> None:
 
 
 def give_up(text: str) -> NoReturn:
-    """End this process, which can do nothing else any more, with one line."""
+    """End this process with one line, because it cannot continue."""
     say(text)
     os._exit(Exit.BAD_INPUT)
 
 
 class Watchdog:
-    """Looks whether a call of a user's code takes longer than a limit. One for each process."""
+    """Checks whether a call of a user's code takes longer than a limit. One per process."""
 
     def __init__(self) -> None:
         self._sweep: Sweep
@@ -55,7 +55,7 @@ class Watchdog:
         self._heard: list[int] = []
 
     def listen(self) -> None:
-        """Hear the signals to this process while a model keeps Python from it; main thread only."""
+        """Receive signals while a model prevents Python from handling them; main thread only."""
         self._signals, out = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.set_wakeup_fd(out, warn_on_full_buffer=False)
         os.register_at_fork(after_in_child=lambda: signal.set_wakeup_fd(-1))

@@ -1,6 +1,6 @@
-"""One block: claimed, computed, written. The one unit of work that all executors share.
+"""One block: claim, compute, write. All executors share this unit of work.
 
-Whatever goes wrong with a block is said in its receipt; nothing is raised through a scheduler.
+The receipt of a block reports every error; no exception passes through a scheduler.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class StopSignal:
 def do_block(
     message: RunMessage, block: int, local_stop: Callable[[], bool] | None = None
 ) -> BlockReceipt:
-    """Claim a block, compute what is to do in it, write it.
+    """Claim a block, compute its pending points, write it.
 
     local_stop: a second reason to stop, next to the run's stop file.
     """
@@ -90,20 +90,20 @@ def do_block(
 
 
 def hand_back_all() -> None:
-    """Give up the claims in hand at once: this process is being ended, not by its work."""
+    """Release all claims at once: this process is being ended, but its work is not the cause."""
     for claim in _in_hand:
         with suppress(OSError):
             claim.hand_back()
 
 
 def blame_memory() -> None:
-    """Leave word at the blocks in hand that this process is being ended for its use of memory."""
+    """Record in the claims of this process that it is being ended for its use of memory."""
     for claim in _in_hand:
         claim.blame_memory()
 
 
 def blame_model() -> None:
-    """Leave word at the blocks in hand that this process is being ended: its model hangs."""
+    """Record in the claims of this process that it is being ended because its model hangs."""
     for claim in _in_hand:
         claim.blame_model()
 
@@ -118,7 +118,7 @@ _in_hand: list[Claim] = []
 
 
 class _Block:
-    """A block in work: what is left of it, and what has come of it so far."""
+    """A block that is being computed: its pending points, and its results so far."""
 
     def __init__(self, message: RunMessage, block: int, stop: StopSignal) -> None:
         self.message, self.block, self.stop = message, block, stop
@@ -151,7 +151,7 @@ class _Block:
         )
 
     def _rows_to_do(self) -> Rows:
-        """Return which points of the store are to be done, as far as one sees without a claim."""
+        """Return which points of the store are pending, as seen without a claim."""
         retry = self.message.retry
         rows = self.store.points_to_do(self.block, retry.attempts, retry.statuses, retry.before)
         if self.store.n_state:
@@ -160,7 +160,7 @@ class _Block:
 
     @contextmanager
     def _claimed(self, name: int | str) -> Iterator[Claim]:
-        """Hold a claim; it is handed back when the work on it is broken off."""
+        """Hold a claim; release it to others if the work is interrupted."""
         note = {"driver": self.message.driver}
         patience = self.sweep.run.patience
         claim = claim_block(self.store.path, name, self.message.run, expiry=patience, note=note)
@@ -177,7 +177,7 @@ class _Block:
             _in_hand.remove(claim)
 
     def _work(self, claim: Claim) -> bool:
-        """Do what is to do; return whether all of it was reached."""
+        """Compute the pending points; return whether all of them were reached."""
         retry = self.message.retry
         rows = self.store.points_to_do(self.block, retry.attempts, retry.statuses, retry.before)
         together, alone = _tries_together(self._deaths(claim))
@@ -199,7 +199,7 @@ class _Block:
         return True
 
     def _work_along(self, claim: Claim, rows: Rows, together: int, alone: bool) -> bool:
-        """Do points of a chain one after the other; return whether all of them were reached."""
+        """Compute points of a chain one by one; return whether all of them were reached."""
 
         def write(result: BlockResult, tries: int, rows: Rows) -> None:
             self._write(claim, result, tries, rows)
@@ -261,7 +261,7 @@ class _Block:
     def _compute_alone(
         self, claim: Claim, rows: Rows, before: int
     ) -> tuple[BlockResult | None, int]:
-        """Compute one point under a claim of its own, so that a lost worker is known to be its."""
+        """Compute one point under its own claim, to which a lost worker is then attributed."""
         with self._claimed(f"{self.block}_{rows[0]}") as own:
             deaths = self._deaths(own)
             tries = before + len(deaths)
@@ -276,7 +276,7 @@ class _Block:
         return result, tries
 
     def _failed(self, points: Points, death: LostAttempt) -> BlockResult:
-        """Return the result of a point that its workers died of."""
+        """Return the result of a point that killed its workers."""
         if death.no_return:
             result = self._none(points, Status.TIME_OUT)
             result.elapsed_us[:] = int(1e6 * limit_of(self.sweep))
@@ -291,7 +291,7 @@ class _Block:
     def _deaths(self, claim: Claim) -> list[LostAttempt]:
         """Return the earlier attempts that may have died of the work itself.
 
-        A worker that went down after its driver, or with it, says nothing about the points.
+        A worker that ended with or after its driver is no evidence against the points.
         """
         return [
             lost

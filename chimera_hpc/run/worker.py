@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _MEMORY = Path("/proc/self/statm")
 _LEAVE_SECONDS = 1.5
-"""Time for a block to be given up in good order when a batch system ends the worker."""
+"""Time for a block to stop cleanly when a batch system ends the worker."""
 _NEARLY = 0.9
 """Share of the memory limit from which an end is put down to the use of memory; Dask ends a
 worker at 0.95 of it."""
@@ -34,7 +34,7 @@ class SignalPlugin(WorkerPlugin):
     name = "chimera_hpc"
 
     def setup(self, worker: Worker) -> None:
-        """Leave Ctrl-C to the driver, and leave word when the memory was the end.
+        """Leave Ctrl-C to the driver, and record an end by the use of memory in the claims.
 
         A terminal sends SIGINT to all processes of a run at once; the driver stops the workers in
         good order. A nanny ends a worker that uses too much memory with SIGTERM: the next owner of
@@ -61,7 +61,7 @@ class SignalPlugin(WorkerPlugin):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, BLOCKED)
 
     def teardown(self, worker: Worker) -> None:
-        """Spare the end of the process the look through everything for garbage."""
+        """Skip garbage collection at the end of the process, which takes time."""
         gc.freeze()
 
 
@@ -75,7 +75,7 @@ def _end_at_once(text: str) -> None:
 
 
 def _drop_work() -> None:
-    """Let the block in hand be given up in good order, for a short while; then give it up."""
+    """Wait a short time for the current block to be stopped cleanly; then release it."""
     from chimera_hpc.run.work import hand_back_all, is_busy
 
     leaving.set()

@@ -1,1 +1,1 @@
-"""The store of a sweep, in Zarr v3: schema, ledger, claims; written, read, checked, merged."""
+"""The store of a sweep in Zarr v3 (schema, ledger, claims): write, read, check, extend, merge."""

@@ -1,4 +1,4 @@
-"""What a block of points leaves behind, as arrays."""
+"""The results of a block of points, as arrays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BlockResult:
-    """What a block of n points leaves behind; rows in the order of the points.
+    """The results of a block of n points; rows in the order of the points.
 
     A point that was not reached (the caller stopped) has status NEVER and is not written.
 

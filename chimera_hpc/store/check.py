@@ -1,4 +1,4 @@
-"""Finding what is not as it was written: missing, cut short, altered."""
+"""Finds damaged chunks: missing, truncated, altered."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Who works on which block: one claim file per attempt, so that many runners share a store.
+"""Which process works on which block: one claim file per attempt; many processes share a store.
 
 The file of attempt k on block i is ``claims/<i>.<k>.json`` inside the store. The block belongs to
-the highest attempt present. A claim is made by creating the next file exclusively, so that of many
-runners who find a block free, or a claim expired, exactly one gets it. There is no lock that could
-go stale (`flock` is not dependable on network file systems), and files are never moved, so that no
-process can push away a claim that was made after it looked. The file exists before the work begins:
-a block that kills its worker every time leaves a file each time, and its next owner sees them all
-in `Claim.lost`.
+the highest attempt present. A process claims a block by creating the next file exclusively. If many
+processes find a block free, or a claim expired, exactly one gets it. There is no lock that could go
+stale (`flock` is not dependable on network file systems), and files are never moved, so that no
+process can remove a claim that is newer than its last check. The file exists before the work
+begins: a block that kills its worker every time leaves a file each time, and its next owner sees
+them all in `Claim.lost`.
 
 A claim is alive while its file's modification time, the heartbeat, is younger than `expiry` by the
 file server's own clock. A claim whose process is gone from this very machine is free at once.
@@ -39,12 +39,12 @@ FOLDER = "claims"
 EXPIRY = 60.0
 """Seconds without a heartbeat after which a claim is free; kernels return to Python every 0.5 s."""
 _HANDED_BACK, _OUT_OF_MEMORY, _NO_RETURN = 0, 1, 2
-"""Heartbeats, long expired, by which an owner's last word reaches the next one."""
+"""Heartbeats, long expired, that tell the next owner why the last one ended."""
 _NAME = re.compile(r"(?P<block>\w+)\.(?P<attempt>[1-9]\d*)\.json", re.ASCII)
 
 
 class ClaimLost(RuntimeError):
-    """The block has another owner by now, who will write it."""
+    """The block now has another owner, who will write it."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,11 @@ class LostAttempt:
     attempt: int
     """Which attempt it was, from 1."""
     handed_back: bool
-    """Whether its owner lived to say that it gave up; else the process was lost."""
+    """Whether its owner could still record that it gave up; otherwise the process was lost."""
     out_of_memory: bool
-    """Whether its owner could still say that it was ended for its use of memory."""
+    """Whether its owner could still record that it was ended for its use of memory."""
     no_return: bool
-    """Whether its owner could still say that a call of the model did not return."""
+    """Whether its owner could still record that a call of the model did not return."""
     info: Mapping[str, Any]
     """The contents of the claim file; empty when unreadable."""
 
@@ -92,7 +92,7 @@ class Claim:
         return True
 
     def still_mine(self) -> bool:
-        """Whether no one took the block over. Asked again right before the ledger is written."""
+        """Whether no other process took the block. Checked again before the ledger is written."""
         if max(_attempts(self.path.parent, self.block), default=0) != self.attempts:
             return False
         return _read(self.path).get("token") == self.token
@@ -110,12 +110,12 @@ class Claim:
             os.utime(self.path, (_HANDED_BACK, _HANDED_BACK))
 
     def blame_memory(self) -> None:
-        """Leave word that this process is being ended because it uses too much memory."""
+        """Record that this process is being ended because it uses too much memory."""
         with contextlib.suppress(OSError):
             os.utime(self.path, (_OUT_OF_MEMORY, _OUT_OF_MEMORY))
 
     def blame_model(self) -> None:
-        """Leave word that this process is being ended because the model does not return."""
+        """Record that this process is being ended because the model does not return."""
         with contextlib.suppress(OSError):
             os.utime(self.path, (_NO_RETURN, _NO_RETURN))
 

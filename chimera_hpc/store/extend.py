@@ -1,4 +1,4 @@
-"""Stores that grow: new points behind the old ones, and what puts a half-changed store right."""
+"""Extends stores by new points, and repairs stores after an interrupted change."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SAME_TABLES = ("model", "network", "integrator", "continue_", "features", "keep"
 
 @contextlib.contextmanager
 def exclusive(path: Path) -> Iterator[None]:
-    """Let this process alone change the metadata of a store; BadInput when others do all the time.
+    """Let only this process change the metadata of a store; BadInput if others take too long.
 
     What was read of the metadata before may be out of date by now.
     """

@@ -37,8 +37,8 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     xarray.Dataset
         Features are ``amplitude(point, node)`` and so on, scalars ``V_theta(point)``, the ledger's
         fields ``status(point)``; all NaN where a point has no result. With u on links or triangles,
-        that dimension is called ``link`` or ``triangle``; the coordinate `size` tells how many a
-        point has, and what is beyond is NaN. Coordinates are the parameters and `cell`, the number
+        that dimension is called ``link`` or ``triangle``; the coordinate `size` gives their number
+        for each point; values beyond are NaN. Coordinates are the parameters and `cell`, the number
         of the point's combination of all parameters but the seed:
         ``set_index(point=["cell", "seed"]).unstack()`` makes them dimensions. For each cut k
         of the reduction, ``class_k(point)`` is the class of a run and ``modal_class_k(point)`` that

@@ -1,4 +1,4 @@
-"""The ledger: what became of every point, read straight from its chunk files, without Zarr.
+"""The ledger, with the outcome of every point, read directly from its chunk files, without Zarr.
 
 A chunk of the ledger is the plain little-endian bytes of (points of the block) x `FIELDS` int64,
 followed by their crc32c (Zarr v3 codecs `bytes` and `crc32c`); `features` and `scalars` are stored

@@ -1,4 +1,4 @@
-"""Making one store of several: their points, results and records of runs."""
+"""Merges several stores into one: their points, results and records of runs."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ class Merged:
 
 
 def merge(path: Path, stores: Sequence[Store]) -> Merged:
-    """Create at `path` a store of all points of `stores`; all of it or nothing.
+    """Create at `path` a store of all points of `stores`, completely or not at all.
 
     A point that is in several stores is taken from the first one that has a result for it, else
     from the first that tried it. Runs are renumbered, store after store.
 
     Raises BadInput when the path exists or cannot be written, or the sweeps differ in more than
     their axes.
-    Raises DamagedChunk when a chunk of one of the stores is.
+    Raises DamagedChunk when a chunk of one of the stores is damaged.
     """
     for other in stores[1:]:
         _check_alike(stores[0], other)

@@ -1,4 +1,4 @@
-"""Where results come from: code, versions, machine, user, job; gathered once a run."""
+"""Where results come from: code, versions, machine, user, job; gathered once per run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The store of a sweep: the only truth about what is done."""
+"""The store of a sweep: the only record of what is done."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ _FREE_TABLES = ("name", "title", "decide", "reduction", "run", "slurm")
 class Store:
     """One sweep's results on disk, block by block; make one with `plan` or `open`.
 
-    A block is written whole, the ledger last, so that what the ledger vouches for is on the disk.
-    Results are never overwritten: a late or repeated write of a block leaves every finished row as
-    it is.
+    A whole block is written at once, the ledger last, so that all results that the ledger reports
+    are on the disk. Results are never overwritten: a late or repeated write of a block does not
+    change finished rows.
     """
 
     def __init__(self, path: Path, metadata: Mapping[str, Any], sweep: Sweep) -> None:
@@ -67,7 +67,7 @@ class Store:
 
     @classmethod
     def plan(cls, path: str | Path, sweep: Sweep) -> Self:
-        """Create the store of a sweep, all of it or nothing; BadInput when the path exists."""
+        """Create the store of a sweep, completely or not at all; BadInput when the path exists."""
         write_template(Path(path), sweep)
         return cls.open(path)
 
@@ -173,8 +173,9 @@ class Store:
     def extend(self, sweep: Sweep) -> Self:
         """Add the points of `sweep` that are not in the store, behind the others; return the store.
 
-        Finished points are not touched. `sweep` must hold all points of the store and differ in
-        its axes only; else BadInput. Killed half-way, it has not happened and can be done again.
+        Finished points are not touched. `sweep` must hold all points of the store and differ in its
+        axes only; else BadInput. An extension that is killed half-way has no effect and can be
+        repeated.
         """
         origin = self._with_model_of(sweep).sweep.origin
         with exclusive(self.path):
@@ -253,7 +254,7 @@ class Store:
         self.files.file("ledger", i).unlink(missing_ok=True)
 
     def repair(self) -> list[str]:
-        """Put right what any process can, and return what that was, a line each.
+        """Repair what any process can repair, and return a line for each repair.
 
         Damaged metadata and coordinates are rewritten; the temporary files of processes that
         are gone are removed, and their claims on finished blocks. Damaged blocks are not touched:
@@ -359,7 +360,7 @@ class Store:
     def starts(self, chosen: Sequence[int] | NDArray[np.int64]) -> NDArray[np.float64] | None:
         """Return the states that points start from, shape (len(chosen), variables).
 
-        NaN for the first point of a chain, which has a first state of its own, and behind a point
+        NaN for the first point of a chain, which has its own initial state, and after a point
         without a state. None for a sweep without [continue]. Raises DamagedChunk.
         """
         if not self.n_state:

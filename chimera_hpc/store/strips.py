@@ -1,7 +1,7 @@
 """Some nodes of a stored series, without decoding the others.
 
-A piece of a series lies in its chunk node by node, compressed by Blosc in blocks of their own: a
-few blocks with a header of their own are a Blosc buffer again.
+A piece of a series is stored node by node, and Blosc compresses it in separate blocks. Some of
+these blocks with a new header form a valid Blosc buffer.
 """
 
 from __future__ import annotations

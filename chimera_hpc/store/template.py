@@ -62,7 +62,7 @@ def write_template(path: Path, sweep: Sweep) -> None:
 
 
 def create_whole(path: Path, make: Callable[[Path], None]) -> None:
-    """Create a store; all of it or nothing.
+    """Create a store, completely or not at all.
 
     `make` builds it under a temporary name in the same folder, then it is flushed to the disk and
     renamed. Raises BadInput when the path exists or cannot be written.
@@ -113,7 +113,7 @@ def root_attributes(sweeps: Sequence[Sweep], n_points: int, size: int) -> dict[s
 def write_root(path: Path, attributes: Mapping[str, Any]) -> None:
     """Write the root metadata with the metadata of all arrays as they are now.
 
-    This is the moment from which a plan or an extension counts.
+    A plan or an extension is valid from this moment on.
     """
     _write_root(path, attributes, _nodes(path, "*") | _nodes(path, f"{REDUCTION}/*"))
 

@@ -1,4 +1,4 @@
-"""Writing a block: data first, the ledger last, finished rows untouched."""
+"""Writes a block: data first, the ledger last, finished rows unchanged."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _confirm(claim: Claim | None) -> None:
 
 
 def _stored(files: BlockFiles, block: int) -> tuple[Rows, NDArray[np.int64]]:
-    """Return the chunks of a block as far as they hold, and how often each point was tried."""
+    """Return the undamaged chunks of a block, and how often each point was tried."""
     ledger = read_block(files.path, block, files.shapes["ledger"][0])
     if ledger is not None:
         tried = table_columns(ledger)["attempts"]

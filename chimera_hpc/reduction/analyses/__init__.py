@@ -1,4 +1,4 @@
-"""What a job asks to be made of its points in addition to the classes: each analysis is one entry.
+"""The analyses that a job asks for in addition to the classes; each makes one entry.
 
 For developers: an analysis is a function in a file of this folder that takes an `AnalysisInput`
 and returns what results.json is to hold of it under ``curves``; and one line in `job.registry`. It
@@ -16,7 +16,7 @@ from chimera_hpc.reduction.analysis_input import AnalysisInput
 
 
 def analyse(given: AnalysisInput, say: Callable[[str], None]) -> dict[str, Any]:
-    """Make the analyses that the job asks for; one that can't be made is said, not raised."""
+    """Make the analyses that the job asks for; for one that cannot be made, call `say`."""
     made = {}
     for name in given.sweep.reduction.analyses:
         try:

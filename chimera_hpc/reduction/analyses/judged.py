@@ -1,4 +1,4 @@
-"""Analyses of runs that another sweep's classes judge."""
+"""Analyses of runs that get the classes of another sweep."""
 
 from __future__ import annotations
 

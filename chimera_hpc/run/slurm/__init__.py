@@ -1,1 +1,1 @@
-"""Running on a SLURM cluster: scripts, the queue, certificates, workers, the time that is left."""
+"""Runs on a SLURM cluster: scripts, the queue, certificates, workers, the remaining time."""

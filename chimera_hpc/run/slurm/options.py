@@ -1,4 +1,4 @@
-"""What is wished of SLURM: the user's own file, the job's table [slurm], the command line."""
+"""The options for SLURM: from the user's own file, the job's table [slurm], the command line."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""SLURM's own commands, asked with patience: submit, look, cancel.
+"""SLURM's own commands, repeated if the controller is busy: submit, query, cancel.
 
 A controller that is busy or restarting refuses connections for a while; such answers are tried
-again with growing pauses. Whatever else goes wrong is said in one line. Nothing here needs `sacct`,
-which many sites don't run.
+again with growing pauses. All other errors give one line. Nothing here needs `sacct`, which many
+sites do not run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Batch scripts as text: how each way to run a sweep looks to SLURM.
+"""The text of the batch scripts, one for each way to run a sweep under SLURM.
 
 Each script ends in ``exec python ...``, so that signals reach the program itself and its exit
 status is the job's.
@@ -32,7 +32,7 @@ _PLAIN = re.compile(r"[\w./,:=+%@-]+", re.ASCII)
 def job_name(store: Path, what: str = "") -> str:
     """Return the name of the jobs that work on a store: ``chimera-<digest of its path>-<what>``.
 
-    Left-over jobs are found by it.
+    `cancel` finds jobs that are left over by this name.
     """
     digest = blake2b(str(store.resolve()).encode(), digest_size=5).hexdigest()
     return f"{_PREFIX}-{digest}-{what}"

@@ -1,8 +1,8 @@
 """A certificate for each run: any process that reaches a Dask scheduler can run code as its user.
 
 Scheduler, workers and client of a run hold the same certificate, signed by itself, and each asks
-the others for it. It lies in a folder that only the user can read, on the file system that all
-nodes share (``~/.chimera_hpc`` or ``$CHIMERA_HPC_PRIVATE``), and goes with the run.
+the others for it. It is in a folder that only the user can read, on the file system that all nodes
+share (``~/.chimera_hpc`` or ``$CHIMERA_HPC_PRIVATE``), and is deleted at the end of the run.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def fresh_certificate(name: str, store: Path) -> Iterator[Certificate]:
 def remove_left_over(store: Path, cancelled: Collection[str] = ()) -> list[Path]:
     """Delete the certificates of runs on a store whose driver is gone; return their folders.
 
-    A driver in a job that was cancelled may still breathe, but has no time to clear up. One on
-    another machine can't be asked; its certificate goes too, which ends its run.
+    A driver in a cancelled job may still run, but has no time to clean up. A driver on another
+    machine cannot be checked; its certificate is deleted too, which ends its run.
     """
     found = []
     for note in sorted(home().glob(f"*/{_NOTE}")):

@@ -40,12 +40,12 @@ _LOOK_SECONDS = 60.0
 Rows = NDArray[np.int64]
 
 leaving = threading.Event()
-"""Set when this process is to take no more work and to drop what it has, in good order."""
+"""Set when this process is to take no more work and to stop its current work cleanly."""
 
 
 @dataclass
 class Hours:
-    """The working hours of a process inside a batch job."""
+    """The time limit of a process inside a batch job."""
 
     leave_by: float
     """When it is to be over, in seconds since 1970."""
@@ -132,7 +132,7 @@ def time_to_leave() -> bool:
 
 
 def leave_if_worker() -> None:
-    """End this process, in good order, when its batch job holds it alone; another takes over."""
+    """End this process cleanly if it is the only one of its batch job; another takes over."""
     if WORKER in os.environ:
         leaving.set()
 

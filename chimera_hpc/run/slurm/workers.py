@@ -1,8 +1,8 @@
 """A Dask cluster whose workers are SLURM jobs: one process each, replaced when it is lost.
 
-dask-jobqueue 0.9 submits the jobs. What it leaves undone is done here: a job that was refused, that
-waits, or that ended without its worker is noticed and told; a lost one is replaced; one that SLURM
-itself puts back into the queue is waited for.
+dask-jobqueue 0.9 submits the jobs. This module adds what it lacks: it reports a job that was
+refused, that waits, or that ended without its worker; it replaces a lost job; and it waits for a
+job that SLURM has requeued.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def tunnel(scheduler: Any) -> str:
 
 
 def _mark() -> str:
-    """Return what tells this run's jobs from those of another run on the same store."""
+    """Return a mark that distinguishes this run's jobs from those of other runs on the store."""
     from chimera_hpc.base.processes import process_identity
 
     return process_identity()
