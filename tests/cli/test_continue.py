@@ -230,7 +230,7 @@ def test_first_states_come_from_a_file(tmp_path):
     [
         ({"u": np.zeros(11), "v": np.zeros(24)}, "u has 11 values per state, this model has 12"),
         ({"u": np.zeros(12)}, "v has 0 values per state, this model has 24"),
-        ({"u": np.zeros((1, 12)), "v": np.zeros((2, 24))}, "none for seed 4: row s is for seed s"),
+        ({"u": np.zeros((1, 12)), "v": np.zeros((2, 24))}, "none for seed 2: row s is for seed s"),
         ({"u": np.zeros((1, 12)), "v": np.zeros((4, 24))}, "v has 4 rows, none for seed 4"),
         ({"u": np.full(12, np.nan), "v": np.zeros(24)}, "u holds values that are not finite"),
         ({"w": np.zeros(12)}, "unknown array 'w'"),
@@ -247,7 +247,7 @@ def test_files_that_do_not_fit_are_one_line(arrays, line, tmp_path, capsys):
         (tmp_path / "first.npz").write_text("u")
     elif arrays:
         np.savez(tmp_path / "first.npz", **arrays)
-    changes = {"grid__P": [2], "grid__seeds": [4], "integrator__initial": "first.npz"}
+    changes = {"grid__P": [2], "grid__seeds": [2, 4], "integrator__initial": "first.npz"}
     assert main(["plan", str(write_job(tmp_path, **changes))]) == 2
     error = capsys.readouterr().err
     assert line in error
