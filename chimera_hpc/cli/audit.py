@@ -1,4 +1,4 @@
-"""``audit``: how firm the classes of a sweep are, its error bar."""
+"""``audit``: how reliable the classes of a sweep are, the error bar of its phase diagram."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def end(driver: Driver, folder: Path, args: Namespace) -> int:
 
 
 def interrupted(stop: StopRequest, args: Namespace) -> int:
-    """Say how to go on after work was broken off by a signal, and return the exit status."""
+    """Print how to continue after a signal interrupted the work, and return the exit status."""
     print(f"broken off; to go on:\n  {again_command(args)}")
     return stop.exit_status
 
@@ -81,7 +81,7 @@ def name_of(store: Store, i: int) -> str:
 
 
 def again_command(args: Namespace) -> str:
-    """Return the command that goes on, as it was typed."""
+    """Return the command that continues the sweep, as it was typed."""
     return shlex.join([sys.executable, "-m", "chimera_hpc.sweep", *args.typed])
 
 

@@ -1,4 +1,4 @@
-"""``plan``: what a sweep would cost; starts nothing."""
+"""``plan``: prints what a sweep would cost; starts nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What follows from a store for people: the reduction and the report, at the end and on the way."""
+"""The reduction and the report of a sweep, at the end of a run and during it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 LIVE_SECONDS = 60.0
-"""A run that goes on writes its report again at most this often."""
+"""A run rewrites its report at most this often."""
 _LIVE_SHARE = 0.02
 """Share of a run's time that this may take."""
 _LIVE_PICTURES = 60
@@ -48,7 +48,7 @@ def load_reduction() -> None:
 
 
 class LiveReport:
-    """The report of a run that goes on, rewritten from time to time.
+    """The report of a run in progress, rewritten from time to time.
 
     Nothing is written before `LIVE_SECONDS` have passed, so that short runs don't pay for it; the
     pauses grow with what a report takes.

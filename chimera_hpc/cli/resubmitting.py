@@ -1,4 +1,4 @@
-"""Going on after the time limit of a batch job."""
+"""Continues a sweep after the time limit of a batch job."""
 
 from __future__ import annotations
 

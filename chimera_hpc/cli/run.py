@@ -1,4 +1,4 @@
-"""``run``: plan a sweep or go on with it, compute what is missing, reduce."""
+"""``run``: plan a sweep or continue it, compute what is missing, reduce."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def check_drawing(sweep: Sweep) -> None:
 
 
 def open_or_plan(folder: Path, sweep: Sweep, yes: bool) -> Store:
-    """Return the store in ``folder`` for this sweep: a new one, or the one to go on with."""
+    """Return the store in ``folder`` for this sweep: a new one, or the one to continue."""
     path = folder / STORE
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder}: not a folder")

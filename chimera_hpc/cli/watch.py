@@ -90,7 +90,7 @@ class _View:
 
     @property
     def over(self) -> bool:
-        """Whether every point was tried and no one works on any."""
+        """Whether every point was tried and no process works on any."""
         return not self.state["pending"] and not self.state["blocks_running"]
 
     @property

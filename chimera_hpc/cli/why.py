@@ -1,4 +1,4 @@
-"""``why``: what became of one point, and where it came from."""
+"""``why``: the outcome of one point, and which run, code and machine computed it."""
 
 from __future__ import annotations
 

@@ -370,7 +370,7 @@ def _coverage(points: Mapping[str, int]) -> str:
 def _write_figures(
     folder: Path, makers: Mapping[str, Maker], outcome: FigureInput
 ) -> tuple[Path, ...]:
-    """Draw into a folder of its own, then put each file in its place; remove those of before."""
+    """Draw into a separate folder, then move each file to its place and remove older figures."""
     from chimera_hpc.plot.catalogue import is_figure_name
     from chimera_hpc.plot.style import save
 

@@ -18,7 +18,7 @@ CLOSE_MERGES = 0.02
 
 
 ENOUGH = 30
-"""Runs from which it is said how many classes they look like."""
+"""Smallest number of runs for which the estimated number of classes is reported."""
 
 
 def tree_warnings(made: Classification) -> list[str]:

@@ -35,7 +35,7 @@ _BLOCK_TRIES = 3
 """Errors of the operating system after which a block is left for a later run."""
 _LONGEST_WAIT = 10.0
 _FIRST_RUN = "CHIMERA_HPC_FIRST_RUN"
-"""Environment variable of a process that goes on for another one: the number of that one's run."""
+"""Environment variable of a process that continues for another one: the number of its run."""
 _RUNS_COMPARED = 20
 _RECORD_SECONDS = 30.0
 """What is known of the work is written this often: a run that is killed leaves it."""
@@ -72,7 +72,7 @@ class Driver:
         self._late = False
         self._refused: str | None = None
         self.report: Refreshing | None = None
-        """Written again from time to time while the work goes on, if given."""
+        """Rewritten from time to time during the run, if given."""
         self.meanwhile: Callable[[], object] | None = None
         """What to do in a thread while workers start, if given."""
         self.program: list[str] | None = None

@@ -25,7 +25,7 @@ STORE_NAME = "store.zarr"
 
 
 def open_sweep(path: str | Path) -> xr.Dataset:
-    """Open the folder of a sweep, or its store, as a dataset with one named variable a quantity.
+    """Open the folder of a sweep, or its store, as a dataset with a variable per quantity.
 
     Parameters
     ----------

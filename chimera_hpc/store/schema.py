@@ -223,7 +223,7 @@ def block_plans(
             (("quantity", len(scalars)),),
             "float64",
             math.nan,
-            long_name="one number a run: total variations, measures of incoherence",
+            long_name="one number per run: total variations, measures of incoherence",
             labels=list(scalars),
             label_units=["1"] * len(scalars),
         ),

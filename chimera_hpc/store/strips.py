@@ -212,7 +212,7 @@ class _Buffer:
 
 
 def _checksum(file: BinaryIO, offset: int, size: int) -> bytes:
-    """Return the crc32c of `size` bytes, as it is stored; the file then stands behind them."""
+    """Return the crc32c of `size` bytes, as it is stored; the file position is then after them."""
     file.seek(offset)
     checksum = 0
     while size > 0 and (data := file.read(min(size, _PIECE))):

@@ -159,7 +159,7 @@ def against_peers(sizes: Sizes) -> list[Row]:
     rows = []
     for name, (_, seeds, target) in rivals.items():
         peer, own = times[name] / seeds, times[f"ours at {limits[name]:g}"] / SEEDS
-        note = f"{peer:.3g} s a trajectory and error {found[name]:.1e}; "
+        note = f"{peer:.3g} s per trajectory and error {found[name]:.1e}; "
         note += f"ours {own:.3g} s at rtol {limits[name]:g}"
         what = f"{SEEDS} trajectories, small world of {world.n_nodes} nodes, against {name}"
         rows.append(Row(what, peer / own, "times", target, True, note))

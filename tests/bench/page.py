@@ -66,7 +66,15 @@ def text(results: Results) -> str:
                 ledger=1e9 * costs.point_of_ledger,
             )
         )
-        head = ["run", "cores", "points", "points a block", "hours", "efficiency", "scheduler busy"]
+        head = [
+            "run",
+            "cores",
+            "points",
+            "points per block",
+            "hours",
+            "efficiency",
+            "scheduler busy",
+        ]
         lines = [
             [name, f"{f.cores:,}", f"{f.points:,}", str(f.block), f"{f.hours:.3f}",
              f"{f.efficiency:.1%}", f"{f.scheduler_load:.1%}" if f.scheduler_load else "none"]
@@ -95,7 +103,7 @@ def precision_picture(results: Results) -> Figure:
         errors, seconds = zip(*curve, strict=True)
         axes.loglog(errors, seconds, "o-" if ours else "s--", ms=4, label=name, color=f"C{k}")
     axes.set_xlabel("largest error of u, t ≤ 20")
-    axes.set_ylabel("seconds a trajectory (u every 0.01)")
+    axes.set_ylabel("seconds per trajectory (u every 0.01)")
     axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes.grid(alpha=0.3)
     return figure
@@ -111,9 +119,9 @@ def scaling_picture(scaling: Scaling) -> Figure:
     workers.set_yticks(seconds, [f"{each:.0f}" for each in seconds])
     _measured(points, scaling.points, "two workers: points", "s, whole command", power=1, at=-1)
     whole = [(n, 1e6 * n * each) for n, each in scaling.nodes]
-    _measured(nodes, whole, "P = 12: nodes", "µs a step and trajectory", power=1)
+    _measured(nodes, whole, "P = 12: nodes", "µs per step and trajectory", power=1)
     steps = [(half, 1e6 * each) for half, each in scaling.degrees]
-    _measured(degrees, steps, "50 nodes: P", "µs a step and trajectory, in lanes", power=0)
+    _measured(degrees, steps, "50 nodes: P", "µs per step and trajectory, in lanes", power=0)
     degrees.set_ylim(bottom=0)
     return figure
 

@@ -189,7 +189,7 @@ def _compare(
         equal = times[f"lanes at {rtol:g}"] / SEEDS
         same = best / (times[f"lanes at {RTOL:g}"] / SEEDS)
         what = f"{SEEDS} trajectories, P = {half_degree}, against {name}"
-        text = note.replace(f"{alone:.3g} s", f"{best:.3g} s a trajectory", 1).format(equal, same)
+        text = note.replace(f"{alone:.3g} s", f"{best:.3g} s per trajectory", 1).format(equal, same)
         rows.append(Row(what, best / equal, "times", throughput, True, text))
     return rows
 
@@ -270,7 +270,7 @@ def stepping(sizes: Sizes, scaling: Scaling) -> list[Row]:
     # Rejected steps do no useful work.
     useful = found[halves.index(12)]
     share = FLOPS_PER_NODE * 50 * useful.accepted / useful.seconds / dgemm
-    note = f"{1e6 * useful.seconds / useful.accepted:.3f} us an accepted lane-step, "
+    note = f"{1e6 * useful.seconds / useful.accepted:.3f} us per accepted step of a lane, "
     note += f"{useful.accepted:.1%} of those tried; dgemm {dgemm / 1e9:.1f} GFlop/s"
     rows = [Row("useful work of the stepping loop, of dgemm's rate", share, "", 0.25, True, note)]
     scaling.degrees = list(costs.items())
@@ -312,7 +312,7 @@ def features(sizes: Sizes) -> list[Row]:
     runs = [_whole_and_measuring(sweep, points) for _ in range(sizes.turns + 1)][1:]
     share = statistics.median(measuring / (whole - measuring) for whole, measuring in runs)
     each = [1e3 * statistics.median(times) / len(points) for times in zip(*runs, strict=True)]
-    note = f"{each[1]:.2f} ms of {each[0]:.2f} ms a trajectory"
+    note = f"{each[1]:.2f} ms of {each[0]:.2f} ms per trajectory"
     return [Row("features over integration, 50 nodes, P = 12", share, "", 0.25, False, note)]
 
 

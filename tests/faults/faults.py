@@ -540,7 +540,7 @@ TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
     Strike("SIGTERM", PLACES, _sent(signal.SIGTERM), (75, 0), 2 * BLOCK),
     Strike("Ctrl-C once", PLACES, _sent_to_all(signal.SIGINT), (130, 0), 2 * BLOCK),
     Strike("Ctrl-C twice", PLACES, _interrupt_twice, (130, 0), 2 * BLOCK),
-    Strike("SIGSTOP of a worker, for ever", LOCAL,
+    Strike("SIGSTOP of a worker, never continued", LOCAL,
            lambda _, run: _signal(run.workers()[:1], signal.SIGSTOP), 0, BLOCK),
     Strike("SIGSTOP of a worker, late awakening", LOCAL, _stop_a_worker_for_a_while, 0, BLOCK),
     Story("SIGSTOP of a driver, late awakening", hang_driver_for_a_while),
@@ -549,7 +549,7 @@ TABLE: tuple[Strike | Surroundings | Culprit | Damage | Story, ...] = (
     Story("kill -9 of the scheduler", kill_scheduler, by_turns=True),
     # Points that misbehave
     Culprit("a point that never ends", "forever", (*SERIAL, "--set", "integrator.time_out=3")),
-    Culprit("a point that blows up", "blow-up"),
+    Culprit("a point that diverges", "blow-up"),
     # Twice with its block, twice alone; or once with its block, and once or twice alone.
     Culprit("a point that kills its worker every time", "kill", LOCAL, 4, "worker lost"),
     Culprit("a point that needs more memory than there is", "memory",

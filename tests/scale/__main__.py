@@ -78,7 +78,7 @@ def measure(folder: Path, n_points: int) -> list[Line]:
         Line(f"plan of {n_points:.0e} points: memory", big.memory / MB, "MB", 1000),
     ]
     lines.append(
-        Line("blocks of 300 points, one writer", serial_rate(folder), "a second", 50, True)
+        Line("blocks of 300 points, one writer", serial_rate(folder), "per second", 50, True)
     )
     memory = [scheduler_memory(folder, store.path) for store in (small, big)]
     growth = (memory[1] - memory[0]) / MB

@@ -23,7 +23,7 @@ def incoherence(given: AnalysisInput) -> dict[str, Any]:
     """SI and discontinuity measure for ``reduction.deltas``, and SI against delta as a curve.
 
     Under both units of delta: ``range``, a fraction of the range of u of each run, and
-    ``absolute``. For each delta a row a cell: median and mean SI, SI of every seed, mean
+    ``absolute``. For each delta, a row per cell: median and mean SI, SI of every seed, mean
     discontinuity measure, share of runs with SI = 0, between, and 1, and the modal of these three
     classes. A run without a result is left out.
     """
