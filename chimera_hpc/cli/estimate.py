@@ -80,14 +80,34 @@ def worker_bytes(sweep: Sweep, n_points: int, block: int) -> int:
 
 def memory_lines(need: Estimate) -> list[str]:
     """Return how much memory workers take, and a warning if they exceed the machine's."""
-    total, here = need.workers * need.worker_bytes, usable_memory()
+    total = need.workers * need.worker_bytes
     words = f"about {in_bytes(need.worker_bytes)} per worker, {in_bytes(total)} for {need.workers}"
-    lines = [f"memory      {words}"]
-    if total > here:
-        fit = here // need.worker_bytes
-        advice = f"--workers {fit}" if fit else "a shorter analysis interval or fewer nodes"
-        lines.append(f"warning: there are {in_bytes(here)} of memory here; run with {advice}")
-    return lines
+    return [f"memory      {words}", *_beyond_machine(need.worker_bytes, need.workers)]
+
+
+def memory_warnings(
+    sweep: Sweep, n_points: int, block: int, workers: int, size: str | None
+) -> list[str]:
+    """Return a warning if a worker takes more than `--mem` says, or than its share of the machine.
+
+    workers: local ones, of which each has an equal share if `size` is None.
+    """
+    need = worker_bytes(sweep, n_points, block)
+    if size is None:
+        return _beyond_machine(need, workers)
+    if bytes_of(size) >= need:
+        return []
+    return [f"warning: --mem {size}: a worker takes about {in_bytes(need)}; points may not fit"]
+
+
+def _beyond_machine(need: int, workers: int) -> list[str]:
+    """Return a warning if workers of `need` bytes each exceed the machine's memory."""
+    here = usable_memory()
+    if workers * need <= here:
+        return []
+    fit = here // need
+    advice = f"--workers {fit}" if fit else "a shorter analysis interval or fewer nodes"
+    return [f"warning: there are {in_bytes(here)} of memory here; run with {advice}"]
 
 
 def refuse_small_memory(sweep: Sweep, size: str | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,12 @@ from typing import TYPE_CHECKING
 from chimera_hpc.base.errors import BadInput
 from chimera_hpc.cli.arguments import EXECUTOR, STORE, add, add_slurm, errors_in_one_line
 from chimera_hpc.cli.ending import end, interrupted
-from chimera_hpc.cli.estimate import estimate, refuse_absurd, refuse_small_memory
+from chimera_hpc.cli.estimate import (
+    estimate,
+    memory_warnings,
+    refuse_absurd,
+    refuse_small_memory,
+)
 from chimera_hpc.cli.jobs import executor_of, load_job, start_early, sweep_folder
 from chimera_hpc.cli.reporting import LiveReport, load_reduction
 from chimera_hpc.cli.resubmitting import go_on
@@ -18,6 +24,7 @@ from chimera_hpc.run.driver import Driver
 from chimera_hpc.run.signals import stop_request
 
 if TYPE_CHECKING:
+    from chimera_hpc.run.choice import ExecutorChoice
     from chimera_hpc.store.store import Store
 
 EPILOG = """examples:
@@ -47,6 +54,7 @@ def execute(args: Namespace) -> int:
             if args.cluster in ("local", "slurm"):
                 refuse_small_memory(sweep, args.mem)
             store = open_or_plan(folder, sweep, args.yes)
+            _warn_of_memory(store, executor, args.mem)
             from chimera_hpc.run.messages import RetryPolicy
 
             retry = RetryPolicy(attempts=sweep.run.attempts)
@@ -61,6 +69,14 @@ def execute(args: Namespace) -> int:
             if not stop.broke_off:
                 raise
             return interrupted(stop, args)
+
+
+def _warn_of_memory(store: Store, executor: ExecutorChoice, size: str | None) -> None:
+    """Say if workers may not have the memory that they take."""
+    if executor.kind == "local" or (executor.kind == "slurm" and size is not None):
+        sizes = (store.n_points, store.block_size, executor.n_workers)
+        for line in memory_warnings(store.sweep, *sizes, size):
+            print(line, file=sys.stderr)
 
 
 def check_drawing(sweep: Sweep) -> None:

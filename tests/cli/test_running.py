@@ -17,14 +17,21 @@ from typing import Any
 import pytest
 from jobs_for_tests import SMALL, job_text
 
+from chimera_hpc.base.errors import BadInput
 from chimera_hpc.base.status import Status
 from chimera_hpc.cli.arguments import bytes_of
-from chimera_hpc.cli.estimate import LANES_PER_SAMPLE, MOST_SIDE_BY_SIDE, worker_bytes
+from chimera_hpc.cli.estimate import (
+    LANES_PER_SAMPLE,
+    MOST_SIDE_BY_SIDE,
+    memory_warnings,
+    worker_bytes,
+)
 from chimera_hpc.integrate import lanes
 from chimera_hpc.job import Points, Sweep
 from chimera_hpc.run import work
 from chimera_hpc.run.block import run_block
 from chimera_hpc.run.choice import ExecutorChoice
+from chimera_hpc.run.driver import Driver
 from chimera_hpc.run.executors import ClusterLost
 from chimera_hpc.store.block_result import BlockResult, failed_block
 from chimera_hpc.store.ledger import read_ledger
@@ -405,6 +412,37 @@ def test_memory_in_which_no_worker_can_run_is_refused(
     assert not (tmp_path / "out").exists()
     # A worker, not this process, has the limit.
     assert sweep(*words, "50M", "--cluster", "serial")[0] == 0
+
+
+def test_memory_that_workers_may_exceed_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    small = Sweep.from_toml_text(job_text(SMALL, {"keep.series": "none"}))
+    large = Sweep.from_toml_text(job_text(SMALL, {"integrator.t_end": 500_000.0}))
+    monkeypatch.setattr("chimera_hpc.cli.estimate.usable_memory", lambda: 10**9)
+    for workers, size in ((4, None), (6, "600M")):
+        assert memory_warnings(small, 1, 1, workers, size) == []
+    (line,) = memory_warnings(small, 1, 1, 6, None)
+    assert re.fullmatch("warning: there are 1 GB of memory here; run with --workers [45]", line)
+    (line,) = memory_warnings(large, 1, 1, 1, None)
+    assert line.endswith("run with a shorter analysis interval or fewer nodes")
+    (line,) = memory_warnings(small, 1, 1, 4, "150M")
+    assert re.fullmatch(
+        r"warning: --mem 150M: a worker takes about \d+ MB; points may not fit", line
+    )
+
+
+def test_run_warns_of_memory_before_it_begins(
+    job: Path, tmp_path: Path, sweep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(driver: Driver) -> None:
+        raise BadInput("enough")
+
+    monkeypatch.setattr(Driver, "work", refuse)
+    words = ("run", job, "--out", tmp_path / "out", "--no-figures", "--workers", "2")
+    warnings = [sweep(*words, *more)[2] for more in ((), ("--mem", "150M"))]
+    assert "warning" not in warnings[0]
+    assert "warning: --mem 150M: a worker takes about " in warnings[1]
+    monkeypatch.setattr("chimera_hpc.cli.estimate.usable_memory", lambda: 3 * 10**8)
+    assert "300 MB of memory here; run with --workers 1" in sweep(*words)[2]
 
 
 @pytest.mark.parametrize(
