@@ -161,7 +161,7 @@ def strength_of_run(
     delta: float = 0.1256,
     unit: Literal["range", "absolute"] = "range",
 ) -> float:
-    """Strength of incoherence of a run, in [0, 1], as `chimera_hpc.measures` exports it.
+    """Strength of incoherence of a run, in [0, 1]: `chimera_hpc.measures.strength_of_incoherence`.
 
     Parameters
     ----------
