@@ -169,6 +169,7 @@ def verdict_maps(parameters: Parameters, methods: Methods) -> Figure:
     compared = list(comparable(methods).values())
     shares[column, row] = [_shared([one[i] for one in compared]) for i in range(len(row))]
     mesh = style.draw_shares(axes[-1], across, up, shares)
+    style.set_ticks(axes[-1].xaxis, across)
     axes[-1].set_xlabel(x_label)
     axes[-1].set_title("share that agrees")
     for frame in axes[1:]:

@@ -277,6 +277,7 @@ def test_verdict_maps_show_the_share_that_agrees(rendered: Render) -> None:
     }
     *maps, share, _ = rendered(verdict_maps(plane, methods)).axes
     assert [axes.get_title() for axes in maps] == ["SI", "ACM"]
+    assert share.get_xticks().tolist() == maps[0].get_xticks().tolist()
     (mesh,) = share.collections
     np.testing.assert_array_equal(mesh.get_array(), [[1.0, 1.0], [0.5, 1.0]])
     *_, share, _ = rendered(verdict_maps(plane, {"triplets": list("ABAB"), **methods})).axes
