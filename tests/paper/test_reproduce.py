@@ -71,7 +71,7 @@ def test_a_call_that_only_judges_keeps_audit_and_times(tmp_path: Path) -> None:
     results = json.loads((tmp_path / "results.json").read_text())
     assert (results["cost"], results["seconds"]) == (cost, {"plane": 9.0})
     text = (tmp_path / "claims.md").read_text()
-    assert "in 31 minutes of wall time, on 2 processors" in text
+    assert "in 31 minutes of wall time on 2 processors" in text
     assert "\n\n\n" not in text
 
 
